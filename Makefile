@@ -1,0 +1,69 @@
+# Every target is one visible command. PYTHON=python3.12 make demo picks another interpreter.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name Cargo.toml)
+
+.PHONY: demo test test-rust test-python lint format bench wheel docs lock clean help
+
+help:
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+demo: $(VENV)/built ## build, then simulate, calibrate, measure and compare a four-lidar test
+	$(BIN)/lidar-deflect demo --overwrite
+
+test: test-rust test-python ## every test, Rust and Python
+
+test-rust: cargo
+	cargo test --release --quiet
+
+test-python: $(VENV)/built $(VENV)/tested
+	$(BIN)/python -m pytest
+
+lint: $(VENV)/built $(VENV)/tested cargo ## format, lints and types, changing nothing
+	cargo fmt --all --check
+	cargo clippy --release --workspace --all-targets --quiet -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --release --no-deps --quiet
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest lidar_deflect._native --mypy-config-file pyproject.toml
+
+format: $(VENV)/tested ## rewrite the sources in the house format
+	cargo fmt --all
+	$(BIN)/ruff format
+	$(BIN)/ruff check --fix
+
+bench: cargo ## throughput, see benches/README.md
+	cargo bench
+
+wheel: $(VENV)/ready cargo ## one stable-ABI wheel in dist/
+	$(BIN)/maturin build --release --locked --out dist
+
+lock: $(VENV)/ready ## renew the pinned Python requirements
+	$(BIN)/python -m pip install --quiet uv
+	for set in run test; do $(BIN)/uv pip compile --quiet --universal --python-version 3.11 \
+	  --generate-hashes --no-emit-index-url --no-emit-find-links --no-header \
+	  pyproject.toml $$(cat requirements/$$set.groups) --output-file requirements/$$set.txt || exit 1; done
+
+clean: ## remove what was built
+	rm -rf target $(VENV) dist lidar-deflect-demo
+
+.PHONY: cargo
+cargo:
+	@command -v cargo >/dev/null || { echo 'cargo is missing: install Rust from https://rustup.rs, then open a new shell' >&2; exit 1; }
+
+# An environment that can build and run, then the extension in it, then what the tests need.
+$(VENV)/ready: requirements/run.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo 'Python 3.11 or newer is needed: make PYTHON=python3.12' >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.txt
+	@touch $@
+
+$(VENV)/built: $(VENV)/ready $(RUST) pyproject.toml | cargo
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/tested: requirements/test.txt $(VENV)/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/test.txt
+	@touch $@

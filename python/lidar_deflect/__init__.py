@@ -1,0 +1,1 @@
+"""Large 3D deflections of wind turbine blades from the raw packets of several lidars."""

@@ -1,0 +1,34 @@
+//! Azimuths that wrap: differences and intervals over the seam.
+
+use std::f64::consts::{PI, TAU};
+
+/// `angle_rad` brought into [0, 2 pi).
+pub fn wrap_turn(angle_rad: f64) -> f64 {
+    let wrapped = angle_rad.rem_euclid(TAU);
+    // rem_euclid of a tiny negative number rounds up to the modulus itself.
+    if wrapped >= TAU { 0.0 } else { wrapped }
+}
+
+/// `angle_rad` brought into [-pi, pi).
+pub fn wrap_half_turn(angle_rad: f64) -> f64 {
+    wrap_turn(angle_rad + PI) - PI
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_turn_has_one_seam() {
+        assert_eq!(wrap_turn(TAU), 0.0);
+        assert_eq!(wrap_turn(-1e-18), 0.0);
+        assert!((wrap_turn(-0.1) - (TAU - 0.1)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn differences_over_the_seam_are_short() {
+        let difference = wrap_half_turn(0.01 - (TAU - 0.01));
+        assert!((difference - 0.02).abs() < 1e-15);
+        assert_eq!(wrap_half_turn(PI), -PI);
+    }
+}

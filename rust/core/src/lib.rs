@@ -1,0 +1,14 @@
+//! The numbers of lidar-deflect: from the bytes of a capture to the shape of a blade.
+//!
+//! The library opens no file, prints nothing, reads no clock and has never heard of Python.
+//! Modules in reading order, foundations first; a module uses what stands above it, never below.
+
+pub mod angle;
+pub mod drops;
+pub mod error;
+pub mod time;
+
+pub mod cloud;
+pub mod frame;
+
+pub mod capture;

@@ -1,0 +1,1 @@
+//! Opens captures for `lidar-deflect-core`.

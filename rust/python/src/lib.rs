@@ -1,0 +1,20 @@
+//! The border: arrays in, one call into the core, arrays out.
+//!
+//! A binding function borrows, computes without the interpreter lock, and hands over; it holds no
+//! loop over points and no formula.
+
+// The first binding functions use them.
+#[allow(dead_code)]
+mod arrays;
+#[allow(dead_code)]
+mod compute;
+#[allow(dead_code)]
+mod error;
+
+use pyo3::prelude::*;
+
+/// The compiled part of `lidar_deflect`; private, its public face is the Python package.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))
+}
