@@ -1,6 +1,6 @@
 """Columns into a checked table: names, types and nulls as declared, nothing added silently."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
 import numpy as np
@@ -11,7 +11,7 @@ from lidar_deflect.errors import InvalidValueError
 from lidar_deflect.tables.catalogue import SCHEMAS
 from lidar_deflect.tables.schema import Column, Table, nearest_hint
 
-Values: TypeAlias = npt.ArrayLike | pl.Series | None
+Values: TypeAlias = npt.ArrayLike | Sequence[object] | pl.Series | None
 """Values of one column; ``None`` stands for a column whose values are all missing."""
 
 
