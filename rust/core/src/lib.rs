@@ -12,3 +12,4 @@ pub mod cloud;
 pub mod frame;
 
 pub mod capture;
+pub mod packet;
