@@ -13,3 +13,8 @@ pub mod frame;
 
 pub mod capture;
 pub mod packet;
+
+pub mod fit;
+pub mod neighbors;
+
+pub mod cluster;
