@@ -9,6 +9,7 @@ mod uniform;
 mod varied;
 
 pub use dbscan::{DbscanParams, Radius, dbscan, dbscan_brute};
+pub use line::{Fate, LineClusters, LineParams, line_clusters};
 pub use radius::{Intervals, RadiusModel};
 
 /// Label of points that belong to no cluster.
