@@ -10,7 +10,7 @@ from lidar_deflect import tables
 from lidar_deflect.errors import InvalidValueError, OutputError, ResultError, ResultNotFoundError
 
 ROOT = Path(__file__).parent.parent
-METADATA = {tables.HASH_KEY: tables.configuration_hash("[test]\n")}
+METADATA = {tables.HASH_KEY: "ab" * 32}
 START_NS = 1_718_000_000_255_000_001
 
 

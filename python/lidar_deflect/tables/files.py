@@ -1,6 +1,5 @@
 """Tables on disk: parquet with schema version, program version and configuration hash."""
 
-import hashlib
 import os
 from collections.abc import Mapping
 from importlib.metadata import version
@@ -16,11 +15,6 @@ _SCHEMA_KEY = "lidar_deflect.schema_version"
 _OWN = (_SCHEMA_KEY, "lidar_deflect.program_version", "lidar_deflect.table")
 HASH_KEY = "configuration_hash"
 """Metadata key of the hash of the resolved configuration."""
-
-
-def configuration_hash(text: str) -> str:
-    """Return the hash by which tables name the resolved configuration `text`."""
-    return "sha256:" + hashlib.sha256(text.encode()).hexdigest()
 
 
 def write(
