@@ -22,7 +22,6 @@ from lidar_deflect.cli import (
     simulate,
 )
 from lidar_deflect.cli.failure import INTERRUPTED, show
-from lidar_deflect.cli.talk import quiet_stdout
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -82,10 +81,6 @@ def run(arguments: Sequence[str]) -> int:
     interrupt = _Interrupt()
     try:
         code = app(list(arguments), prog_name=PROGRAM, standalone_mode=False)
-        sys.stdout.flush()
-    except BrokenPipeError:
-        quiet_stdout()
-        return 0
     except (Exception, KeyboardInterrupt) as error:
         interrupt.disarm()
         return show(KeyboardInterrupt() if interrupt.came else error, arguments)

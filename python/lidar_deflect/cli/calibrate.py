@@ -44,7 +44,10 @@ def calibrate(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Find the poses of all lidars from captures of the unloaded blade."""
+    """Find the poses of all lidars.
+
+    From captures of the unloaded blade.
+    """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     free(out, overwrite)
     changes = overrides(config, set_, sensor, beams)

@@ -30,7 +30,10 @@ def compare(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Hold a measurement against a reference: the paper's table 2."""
+    """Hold a measurement against a reference.
+
+    Prints the paper's table 2 and keeps comparison.parquet in the result folder.
+    """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     against = reference or other
     if against is None or (reference and other):

@@ -47,7 +47,10 @@ def decode(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write the points of a capture, in the sensor frame and in the order of arrival."""
+    """Write the points of a capture.
+
+    In the sensor frame and in the order of arrival.
+    """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     models, files = sensor_models(sensor), beam_files(beams)
     free(out, overwrite)

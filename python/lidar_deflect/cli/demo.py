@@ -29,9 +29,10 @@ def demo(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Simulate a four-lidar edgewise test, measure it and say how far off the result is.
+    """Simulate a test, measure it, compare with its truth.
 
-    Needs no data. Leaves the simulated capture, the result tables and a report in the folder.
+    A four-lidar edgewise test; needs no data. Leaves the simulated capture, the result tables
+    and a report in the folder.
     """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     free(out, overwrite)

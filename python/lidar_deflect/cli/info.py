@@ -29,7 +29,10 @@ def info(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Tell what a capture holds: sensors, packets, losses, time span, clocks."""
+    """Tell what a capture holds.
+
+    Sensors, packets, losses, time span, clocks.
+    """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     models, files = sensor_models(sensor), beam_files(beams)
     from lidar_deflect import capture

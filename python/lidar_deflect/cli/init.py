@@ -62,7 +62,7 @@ def init(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write a commented configuration from what the captures hold."""
+    """Write a commented configuration for captures."""
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     free(out, overwrite)
     from lidar_deflect import capture

@@ -23,7 +23,10 @@ def report(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Write one HTML file with figures and tables from a result folder alone."""
+    """Write one HTML file with figures and tables.
+
+    Made from the result folder alone; works offline.
+    """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     if out is not None:
         free(out, overwrite)

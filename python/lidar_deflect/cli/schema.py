@@ -18,7 +18,7 @@ class What(StrEnum):
 def schema(
     what: Annotated[What, typer.Argument(help="config, or tables.")],
 ) -> None:
-    """Print the JSON schema of the configuration or of the tables."""
+    """Print a JSON schema."""
     document = _config() if what is What.CONFIG else _tables()
     Talk().result(document, to_json(document))
 

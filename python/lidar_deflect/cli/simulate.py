@@ -25,7 +25,10 @@ def simulate(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Simulate a test: a capture of a bending blade, its configuration and its truth."""
+    """Simulate a test with its truth.
+
+    Writes a capture of a bending blade, its configuration, survey channels and truth.
+    """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     free(out, overwrite)
     from lidar_deflect import scene

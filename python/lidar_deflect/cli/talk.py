@@ -40,10 +40,13 @@ class Talk:
 
     def result(self, document: Mapping[str, Any], text: str) -> None:
         """Print the result: the document with ``--json``, else the text."""
-        if self.as_json:
-            print(to_json(document))
-        elif text:
-            print(text)
+        shown = to_json(document) if self.as_json else text
+        if not shown:
+            return
+        try:
+            print(shown, flush=True)
+        except BrokenPipeError:  # the reader has seen enough, as `head` does
+            quiet_stdout()
 
     def note(self, text: str) -> None:
         """Say something by the way."""
