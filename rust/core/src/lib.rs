@@ -12,3 +12,5 @@ pub mod cloud;
 pub mod frame;
 
 pub mod capture;
+
+pub mod synthetic;

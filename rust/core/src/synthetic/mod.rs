@@ -1,0 +1,12 @@
+//! A bending blade of known shape before simulated lidars: truth for tests, benches and `simulate`.
+//!
+//! It shares no shape code with any estimator: the blade is bent by its own solver from stiffness
+//! and loads, and its surface differs from the drawing.
+
+pub mod blade;
+pub mod contour;
+pub mod interpolate;
+pub mod random;
+pub mod reference;
+pub mod rod;
+pub mod solver;
