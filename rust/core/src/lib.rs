@@ -14,3 +14,4 @@ pub mod frame;
 pub mod capture;
 
 pub mod synthetic;
+pub mod packet;
