@@ -13,5 +13,6 @@ pub mod frame;
 
 pub mod capture;
 
-pub mod synthetic;
 pub mod packet;
+
+pub mod synthetic;

@@ -4,9 +4,12 @@
 //! and loads, and its surface differs from the drawing.
 
 pub mod blade;
+pub mod body;
 pub mod contour;
 pub mod interpolate;
+pub mod motion;
 pub mod random;
 pub mod reference;
 pub mod rod;
 pub mod solver;
+pub mod terrain;
