@@ -106,6 +106,17 @@ impl Body {
         }
     }
 
+    /// A body of nothing.
+    #[cfg(test)]
+    pub(super) fn empty() -> Self {
+        Self {
+            arc_m: Vec::new(),
+            saddles: Vec::new(),
+            skins: Vec::new(),
+            reach_m: Vec::new(),
+        }
+    }
+
     /// Greatest distance of the blade's parts from the axis at a node, metres.
     pub fn reach_m(&self, node: usize) -> f64 {
         self.reach_m[node]

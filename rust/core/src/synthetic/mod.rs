@@ -6,10 +6,17 @@
 pub mod blade;
 pub mod body;
 pub mod contour;
+pub mod echo;
 pub mod interpolate;
+pub mod lidar;
 pub mod motion;
+pub mod network;
+pub mod pcap;
 pub mod random;
 pub mod reference;
 pub mod rod;
+mod sight;
+pub mod simulation;
 pub mod solver;
 pub mod terrain;
+pub mod truth;
