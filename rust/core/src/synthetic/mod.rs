@@ -11,7 +11,6 @@ pub mod interpolate;
 pub mod lidar;
 pub mod motion;
 pub mod network;
-pub mod pcap;
 pub mod random;
 pub mod reference;
 pub mod rod;
@@ -20,3 +19,5 @@ pub mod simulation;
 pub mod solver;
 pub mod terrain;
 pub mod truth;
+
+pub use simulation::{ScenePlan, Simulation};

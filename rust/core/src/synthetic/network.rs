@@ -1,6 +1,6 @@
 //! From the sensors to the recording: loss, duplicates, delays, other traffic.
 
-use std::net::{Ipv4Addr, SocketAddrV4};
+use std::net::SocketAddr;
 
 use super::lidar::Lidar;
 use super::random::{Stream, Subject};
@@ -46,9 +46,9 @@ pub struct Arrival {
     /// Number that orders arrivals of equal time.
     pub order: u64,
     /// From where.
-    pub source: SocketAddrV4,
+    pub source: SocketAddr,
     /// To where.
-    pub destination: SocketAddrV4,
+    pub destination: SocketAddr,
     /// What.
     pub payload: Vec<u8>,
 }
@@ -106,8 +106,8 @@ impl NetworkPlan {
         let mut arrivals = Vec::new();
         for number in ticks(self.foreign_hz, from_ns, to_ns) {
             let time = start + tick_ns(self.foreign_hz, number);
-            let neighbour = SocketAddrV4::new(Ipv4Addr::new(192, 168, 1, 50), 1900);
-            let group = SocketAddrV4::new(Ipv4Addr::new(239, 255, 255, 250), 1900);
+            let neighbour = SocketAddr::from(([192, 168, 1, 50], 1900));
+            let group = SocketAddr::from(([239, 255, 255, 250], 1900));
             arrivals.push(arrival(
                 time,
                 0,
@@ -147,8 +147,8 @@ fn ticks(rate_hz: f64, from_ns: i64, to_ns: i64) -> std::ops::Range<u64> {
 fn arrival(
     time: Timestamp,
     order: u64,
-    source: SocketAddrV4,
-    destination: SocketAddrV4,
+    source: SocketAddr,
+    destination: SocketAddr,
     payload: Vec<u8>,
 ) -> Arrival {
     Arrival {
@@ -162,13 +162,13 @@ fn arrival(
 
 impl Lidar {
     /// Where its packets come from.
-    pub fn source(&self) -> SocketAddrV4 {
-        SocketAddrV4::new(Ipv4Addr::from(self.plan.address), 2368)
+    pub fn source(&self) -> SocketAddr {
+        SocketAddr::from((self.plan.address, 2368))
     }
 
     /// Where its packets go to: the recording host.
-    pub fn destination(&self, port: u16) -> SocketAddrV4 {
-        SocketAddrV4::new(Ipv4Addr::new(192, 168, 1, 100), port)
+    pub fn destination(&self, port: u16) -> SocketAddr {
+        SocketAddr::from(([192, 168, 1, 100], port))
     }
 }
 

@@ -11,7 +11,6 @@ use super::echo::{Optics, View};
 use super::lidar::{Lidar, LidarPlan, PACKET_NS};
 use super::motion::{Motion, Schedule, Sway};
 use super::network::{Arrival, Fate, NetworkPlan};
-use super::pcap;
 use super::random::{Stream, Subject};
 use super::reference::Stations;
 use super::rod::Node;
@@ -19,6 +18,7 @@ use super::sight::Sight;
 use super::solver::{Loads, Pull};
 use super::terrain::{Crate, Ground, GroundPlan, Terrain, Wall};
 use super::truth::{self, SectionTruth};
+use crate::capture::PcapWriter;
 use crate::error::InvalidValue;
 use crate::packet::ReturnMode;
 use crate::packet::velodyne::{BLOCKS, CHANNELS, RawBlock, encode, puck};
@@ -196,10 +196,7 @@ impl Simulation {
     ///
     /// # Errors
     /// Those of the writer.
-    pub fn advance(&mut self, writer: &mut impl Write) -> io::Result<bool> {
-        if self.done_ns == 0 {
-            pcap::write_header(writer)?;
-        }
+    pub fn advance<W: Write>(&mut self, writer: &mut PcapWriter<W>) -> io::Result<bool> {
         let from_ns = self.done_ns;
         let to_ns = (from_ns + WINDOW_NS).min(self.duration_ns());
         let mut arrivals = std::mem::take(&mut self.pending);
@@ -213,7 +210,12 @@ impl Simulation {
         let ripe = arrivals.partition_point(|arrival| ended || arrival.time < start + to_ns);
         self.pending = arrivals.split_off(ripe);
         for arrival in &arrivals {
-            pcap::write_arrival(writer, arrival)?;
+            writer.write_udp(
+                arrival.time,
+                arrival.source,
+                arrival.destination,
+                &arrival.payload,
+            )?;
         }
         self.done_ns = to_ns;
         Ok(!ended)

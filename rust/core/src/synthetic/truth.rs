@@ -23,6 +23,18 @@ pub struct SectionTruth {
     pub twist_rad: f64,
 }
 
+impl SectionTruth {
+    /// Middle, leading edge, trailing edge, chord direction and twist in one row.
+    pub fn row(&self) -> [f64; 13] {
+        let vectors = [self.middle_m, self.leading_m, self.trailing_m, self.chord];
+        std::array::from_fn(|i| {
+            vectors
+                .get(i / 3)
+                .map_or(self.twist_rad, |vector| vector[i % 3])
+        })
+    }
+}
+
 /// A material section, with what is needed to follow it.
 #[derive(Debug, Clone)]
 struct Follower {
