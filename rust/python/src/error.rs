@@ -1,6 +1,6 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
-use lidar_deflect_core::error::{Coded, InvalidValue};
+use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -35,6 +35,7 @@ macro_rules! translate {
 }
 
 translate! {
+    CaptureError => "CaptureError",
     InvalidValue => "InvalidValueError",
 }
 
