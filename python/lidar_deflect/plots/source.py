@@ -24,6 +24,8 @@ class HasTables(Protocol):
 def table(result: HasTables, name: str) -> pl.DataFrame:
     """Return the table `name` of a result; without rows where it has none."""
     found = getattr(result, name, None)
+    if found is None:
+        found = getattr(result, "frames", {}).get(name)
     return tables.empty(name) if found is None else found
 
 
