@@ -92,6 +92,19 @@ class MeasurementError(LidarDeflectError):
     exit_code = 5
 
 
+class ResultError(LidarDeflectError, ValueError):
+    """A result folder, table or reference that cannot be used."""
+
+    default_code = "result"
+    exit_code = 3
+
+
+class ResultNotFoundError(ResultError, FileNotFoundError):
+    """A result folder, table or reference that is not there."""
+
+    default_code = "result.not_found"
+
+
 class OutputError(LidarDeflectError, OSError):
     """A result that cannot be written."""
 

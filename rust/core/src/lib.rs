@@ -12,3 +12,8 @@ pub mod cloud;
 pub mod frame;
 
 pub mod capture;
+pub mod clock;
+pub mod loss;
+pub mod packet;
+pub mod stream;
+pub mod sweep;

@@ -1,5 +1,6 @@
 //! Checks on arrays that come in; each message names the argument, what it is and what was expected.
 
+use nalgebra::{Unit, Vector3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 
 use crate::error::BorderResult;
@@ -42,4 +43,17 @@ pub fn column<'a, T: numpy::Element>(
         return Err(refuse(format!("{} values", values.len())).into());
     }
     Ok(values)
+}
+
+/// Reads a direction of three numbers and makes it a unit vector.
+pub fn direction(
+    name: &'static str,
+    array: &PyReadonlyArray1<'_, f64>,
+) -> BorderResult<Unit<Vector3<f64>>> {
+    let values = column(name, array, 3)?;
+    let vector = Vector3::new(values[0], values[1], values[2]);
+    Unit::try_new(vector, 1e-9).filter(|unit| unit.iter().all(|v| v.is_finite())).ok_or_else(|| {
+        let found = format!("{values:?}");
+        InvalidValue { name, expected: "a direction of finite length".into(), found }.into()
+    })
 }

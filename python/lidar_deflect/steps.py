@@ -1,0 +1,126 @@
+"""Averages of the deflection table over the holds: one row per load step and section."""
+
+from collections.abc import Sequence
+
+import polars as pl
+
+from lidar_deflect import tables
+from lidar_deflect.holds import Hold
+
+SEEN = ("ok", "degraded")
+"""Statuses of states that were measured."""
+
+_FILLED = ("interpolated", "extrapolated")
+_COMPONENTS = (("dx_m", "dy_m", "dz_m"), ("dxr_m", "dyr_m", "dzr_m"))
+_TOTALS = ("d_m", "dr_m")
+
+
+def average(deflection: pl.DataFrame, holds: Sequence[Hold]) -> pl.DataFrame:
+    """Average the deflection over each hold.
+
+    Measured states (`ok`, `degraded`) count; where a hold has none, filled ones (`interpolated`,
+    `extrapolated`) do and give the row their status. A step of which under half of the states were
+    measured is `degraded`, with the commonest reason. Total deflections are the norms of the
+    averaged components. Uncertainties are averaged, not divided by the root of the count: what a
+    hold's states share does not average out.
+
+    Parameters
+    ----------
+    deflection
+        Table ``deflection``.
+    holds
+        Load steps in time order.
+
+    Returns
+    -------
+    polars.DataFrame
+        Table ``steps``; sections in the order in which they first appear.
+    """
+    parts = [_one(deflection, hold, section) for hold in holds for section in _sections(deflection)]
+    if not parts:
+        return tables.empty("steps")
+    return tables.build("steps", pl.concat(parts, how="vertical"))
+
+
+def _sections(deflection: pl.DataFrame) -> list[tuple[str, float]]:
+    return deflection.select("section", "s_m").unique(maintain_order=True).rows()
+
+
+def _one(deflection: pl.DataFrame, hold: Hold, section: tuple[str, float]) -> pl.DataFrame:
+    time = pl.col("time").cast(pl.Int64)
+    rows = deflection.filter(
+        pl.col("section") == section[0], time.is_between(hold.from_ns, hold.to_ns)
+    )
+    used = _used(rows)
+    status, reason = _status(rows, used)
+    head: dict[str, tables.Values] = {
+        "time": [hold.middle_ns],
+        "t_s": [_t_s(deflection, hold)],
+        "from": [hold.from_ns],
+        "to": [hold.to_ns],
+        "step": [hold.label],
+        "load": [hold.load_percent],
+        "section": [section[0]],
+        "s_m": [section[1]],
+    }
+    tail: dict[str, tables.Values] = {
+        "n_points": [round(used["n_points"].cast(pl.Float64).mean() or 0)],  # type: ignore[arg-type]
+        "lidars": [_lidars(used)],
+        "status": [status],
+        "reason": [reason],
+    }
+    means: dict[str, tables.Values] = {}
+    means.update(used.select(_means()).with_columns(_totals()).to_dict())
+    return tables.build("steps", {**head, **means, **tail})
+
+
+def _used(rows: pl.DataFrame) -> pl.DataFrame:
+    status = pl.col("status").cast(pl.String)
+    placed = rows.filter(pl.col("x_m").is_not_null())
+    seen = placed.filter(status.is_in(SEEN))
+    return seen if seen.height else placed.filter(status.is_in(_FILLED))
+
+
+def _means() -> list[pl.Expr]:
+    """Mean of every number of a state; null where none of the states has it."""
+    names = tables.SCHEMAS["deflection"].names
+    first, last = names.index("x_m"), names.index("utwist_deg")
+    return [pl.col(name).mean() for name in names[first : last + 1]]
+
+
+def _totals() -> list[pl.Expr]:
+    return [
+        sum((pl.col(c) ** 2 for c in components), start=pl.lit(0.0)).sqrt().alias(total)
+        for components, total in zip(_COMPONENTS, _TOTALS, strict=True)
+    ]
+
+
+def _status(rows: pl.DataFrame, used: pl.DataFrame) -> tuple[str, str | None]:
+    left_out = _commonest(rows, "reason") or ("lost" if rows.is_empty() else None)
+    if used.is_empty():
+        return "missing", left_out
+    status = _commonest(used, "status") or "missing"
+    if status == "ok" and used.height < rows.height / 2:
+        return "degraded", left_out
+    return status, None if status == "ok" else _commonest(used, "reason")
+
+
+def _commonest(rows: pl.DataFrame, name: str) -> str | None:
+    known = rows[name].drop_nulls().cast(pl.String)
+    if known.is_empty():
+        return None
+    word: str = known.value_counts(sort=True).sort(["count", name], descending=[True, False])[name][
+        0
+    ]
+    return word
+
+
+def _lidars(used: pl.DataFrame) -> str:
+    names = {name for row in used["lidars"] for name in row.split("+") if name}
+    return "+".join(sorted(names))
+
+
+def _t_s(deflection: pl.DataFrame, hold: Hold) -> float:
+    """Seconds since the first packet of the middle of a hold, on the table's own clock."""
+    time_ns, t_s = deflection["time"].cast(pl.Int64)[0], deflection["t_s"][0]
+    return float(t_s + (hold.middle_ns - time_ns) * 1e-9)

@@ -1,0 +1,289 @@
+//! From datagrams to returns in the sensor frame: what every sensor model provides, and how a
+//! model is recognised from the content of its packets.
+//!
+//! A new sensor is one value that implements [`Model`] and one line in [`MODELS`]; nothing else in
+//! the library names a model.
+
+pub mod beams;
+pub mod velodyne;
+
+use crate::angle::{Arc, wrap_turn};
+use crate::cloud::Return;
+use crate::drops::Drops;
+use crate::error::InvalidValue;
+use crate::time::{NANOS_PER_HOUR, Timestamp};
+use beams::Beams;
+
+/// A registered sensor model.
+pub type ModelRef = &'static dyn Model;
+
+/// All sensor models, the likelier one first where content and timing fit several.
+pub static MODELS: &[ModelRef] = &[
+    &velodyne::puck::VLP16,
+    &velodyne::puck::VLP16_HIRES,
+    &velodyne::puck::PUCK_LITE,
+];
+
+/// What the library must know of one sensor model.
+pub trait Model: Sync + std::fmt::Debug {
+    /// Product name in lower case without the vendor, such as `vlp16`.
+    fn id(&self) -> &'static str;
+
+    /// Name with vendor, for people.
+    fn title(&self) -> &'static str;
+
+    /// Ids of models whose packets cannot be told from this one's.
+    fn candidates(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// What `payload` is to this model, judged by the bytes that identify it; `None` when it is not its own.
+    fn recognise(&self, payload: &[u8]) -> Option<PacketKind>;
+
+    /// Whether the identifying bytes are this model's alone, so that the packet period need not
+    /// confirm what [`Model::recognise`] says.
+    fn is_sure(&self, _payload: &[u8]) -> bool {
+        true
+    }
+
+    /// Whether `payload` has the layout of a data packet, whatever its identifying bytes say: for
+    /// models that the user names, and to tell how close a foreign packet comes.
+    fn fits(&self, payload: &[u8]) -> bool;
+
+    /// Why `payload`, which fits by its size, was not recognised.
+    fn misfit(&self, payload: &[u8]) -> String;
+
+    /// Times and angles of a data packet without its returns; `None` where the layout is broken.
+    fn head(&self, payload: &[u8]) -> Option<Head>;
+
+    /// Numbers of points and of merged returns in a data packet, without placing them.
+    fn tally(&self, payload: &[u8]) -> Tally;
+
+    /// Time from the first shot of one packet to that of the next, as the maker states it.
+    fn period_ns(&self, mode: ReturnMode) -> i64;
+
+    /// How the sensor numbers and stamps its packets.
+    fn counting(&self) -> Counting {
+        Counting {
+            clock_wrap_ns: Some(NANOS_PER_HOUR),
+            sequence_bits: None,
+        }
+    }
+
+    /// Beams of a unit whose own calibration is not known.
+    fn beams(&self) -> Beams;
+
+    /// Turns data packets into returns with the beams of one unit.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] where `beams` has another number of channels than the model.
+    fn decoder(&self, beams: &Beams) -> Result<Box<dyn Decoder>, InvalidValue>;
+}
+
+/// What a datagram of a sensor is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PacketKind {
+    /// Carries returns.
+    Data,
+    /// Tells position and time of a GNSS receiver, and whether the clock is locked to it.
+    Position,
+    /// Describes the unit: angles, calibration, settings.
+    Metadata,
+    /// Accelerations and turn rates.
+    Inertial,
+}
+
+/// How a sensor numbers and stamps its packets.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Counting {
+    /// The device clock starts again after so many nanoseconds; `None`: never.
+    pub clock_wrap_ns: Option<i64>,
+    /// Width of the sequence number; `None`: there is none.
+    pub sequence_bits: Option<u32>,
+}
+
+/// Which returns of a shot the sensor was set to report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ReturnMode {
+    /// The strongest one.
+    Strongest,
+    /// The last one.
+    Last,
+    /// Last and strongest, or last and second strongest where they are the same.
+    Dual,
+}
+
+impl ReturnMode {
+    /// Word for reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Strongest => "strongest",
+            Self::Last => "last",
+            Self::Dual => "dual",
+        }
+    }
+}
+
+/// Times and angles of one data packet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Head {
+    /// Device time of the first shot, nanoseconds; starts again as [`Counting`] says.
+    pub device_ns: i64,
+    /// Sequence number, where the sensor has one.
+    pub sequence: Option<u32>,
+    /// Encoder azimuth of the first shot, [0, 2 pi).
+    pub azimuth_rad: f64,
+    /// Angle turned from the first shot of this packet to where the next one starts when nothing is lost.
+    pub turned_rad: f64,
+    /// Rotation rate in the sensor's own sense; 0 where it stands or has no rotor.
+    pub rate_rad_per_ns: f64,
+    /// Time from the first shot of this packet to the start of the next when nothing is lost.
+    pub duration_ns: i64,
+    /// Part of the turn within the packet that the sensor left out: its limited field of view.
+    pub left_out: Option<LeftOut>,
+    /// Which returns it carries.
+    pub return_mode: ReturnMode,
+}
+
+/// A gap of a limited field of view inside of a packet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// Angle turned from the packet's first shot to the gap.
+    pub after_rad: f64,
+    /// Width of the gap.
+    pub width_rad: f64,
+}
+
+impl Head {
+    /// Angle that was seen between two angles turned since the first shot.
+    pub fn seen_rad(&self, from_rad: f64, to_rad: f64) -> f64 {
+        let left_out = self.left_out.map_or(0.0, |gap| {
+            let end_rad = gap.after_rad + gap.width_rad;
+            (to_rad.min(end_rad) - from_rad.max(gap.after_rad)).max(0.0)
+        });
+        (to_rad - from_rad - left_out).max(0.0)
+    }
+
+    /// Arcs that were seen: one, or one on each side of the part that was left out.
+    pub fn arcs(&self) -> impl Iterator<Item = Arc> {
+        let arc = |after_rad: f64, until_rad: f64| Arc {
+            from_rad: wrap_turn(self.azimuth_rad + after_rad),
+            width_rad: until_rad - after_rad,
+        };
+        let arcs = match self.left_out {
+            None => [Some(arc(0.0, self.turned_rad)), None],
+            Some(gap) => {
+                let behind_rad = gap.after_rad + gap.width_rad;
+                [
+                    Some(arc(0.0, gap.after_rad)),
+                    Some(arc(behind_rad, self.turned_rad)),
+                ]
+            }
+        };
+        arcs.into_iter().flatten()
+    }
+
+    /// When the rotor had turned by `turned_rad` since the first shot at `start`.
+    pub fn time_at(&self, start: Timestamp, turned_rad: f64) -> Timestamp {
+        if self.rate_rad_per_ns > 0.0 {
+            start + (turned_rad / self.rate_rad_per_ns).round() as i64
+        } else {
+            start
+        }
+    }
+
+    /// Where the next packet starts when nothing is lost, [0, 2 pi).
+    pub fn next_azimuth_rad(&self) -> f64 {
+        wrap_turn(self.azimuth_rad + self.turned_rad)
+    }
+}
+
+/// Echoes in one packet.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Points that decoding gives.
+    pub points: u32,
+    /// Second returns that repeat the first and were merged into it.
+    pub merged: u32,
+}
+
+/// Where a packet stands in its stream and in time.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// UTC of its first shot.
+    pub time: Timestamp,
+    /// Number among the data packets of its stream, 0-based.
+    pub packet: u32,
+}
+
+/// Returns of one packet, in the order of the shots. The buffer is meant to be used again and again.
+#[derive(Debug, Default)]
+pub struct Decoded {
+    /// The returns.
+    pub returns: Vec<Return>,
+    /// Encoder azimuth of each return's shot, before the channel's own offset: what sweeps are cut by.
+    pub encoder_rad: Vec<f32>,
+    /// Second returns that repeat the first and were merged into it.
+    pub merged: u64,
+    /// Blocks that were left out, by reason.
+    pub drops: Drops,
+}
+
+impl Decoded {
+    /// Empties the columns and keeps their memory; the counts go on.
+    pub fn clear(&mut self) {
+        self.returns.clear();
+        self.encoder_rad.clear();
+    }
+}
+
+/// Decodes the data packets of one stream; may carry state from packet to packet.
+pub trait Decoder: Send {
+    /// Appends the returns of `payload` to `out`; a payload of another size gives none and is counted.
+    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded);
+}
+
+/// The model with this id.
+///
+/// # Errors
+/// [`InvalidValue`] that lists the known ids.
+pub fn model(id: &str) -> Result<ModelRef, InvalidValue> {
+    let known = MODELS.iter().find(|model| model.id() == id);
+    known.copied().ok_or_else(|| InvalidValue {
+        name: "sensor model",
+        expected: MODELS.iter().map(|m| m.id()).collect::<Vec<_>>().join(", "),
+        found: id.into(),
+    })
+}
+
+/// Models that claim `payload` as their data packet, the likelier one first.
+pub fn claimants(payload: &[u8]) -> impl Iterator<Item = ModelRef> + '_ {
+    let claims = |model: &ModelRef| model.recognise(payload) == Some(PacketKind::Data);
+    MODELS.iter().copied().filter(claims)
+}
+
+/// What `payload` is beside data, if any model knows.
+pub fn companion(payload: &[u8]) -> Option<PacketKind> {
+    let mut kinds = MODELS.iter().filter_map(|model| model.recognise(payload));
+    kinds.find(|kind| *kind != PacketKind::Data)
+}
+
+/// The model that a packet nobody claims comes closest to, and what speaks against it.
+pub fn closest(payload: &[u8]) -> Option<(ModelRef, String)> {
+    let model = MODELS.iter().copied().find(|model| model.fits(payload))?;
+    Some((model, model.misfit(payload)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ids_are_unique_and_candidates_exist() {
+        for (place, one) in MODELS.iter().enumerate() {
+            assert!(MODELS[..place].iter().all(|other| other.id() != one.id()));
+            assert!(one.candidates().iter().all(|id| model(id).is_ok()));
+        }
+        assert!(model("vlp61").unwrap_err().expected.contains("vlp16"));
+    }
+}

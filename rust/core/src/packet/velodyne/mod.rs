@@ -1,0 +1,181 @@
+//! Velodyne: one data packet of 1206 bytes for all models, little endian.
+//!
+//! Source: the manuals of VLP-16 (63-9243) and HDL-32E (63-9113).
+
+pub mod position;
+pub mod puck;
+mod rotation;
+
+use crate::packet::ReturnMode;
+
+/// Bytes of a data packet.
+pub const LEN: usize = 1206;
+/// Data blocks in a packet.
+pub const BLOCKS: usize = 12;
+/// Channels in a block.
+pub const CHANNELS: usize = 32;
+/// Hundredths of a degree in one turn, the unit of azimuths.
+pub const TURN_CENTIDEG: u16 = 36_000;
+
+/// Byte ranges; names and order follow the manual.
+mod field {
+    use std::ops::Range;
+
+    pub const BLOCK_LEN: usize = 100;
+    pub const FLAG: Range<usize> = 0..2; // in a block: FF EE for lasers 0 to 31
+    pub const AZIMUTH: Range<usize> = 2..4; // in a block: u16, 0.01 deg
+    pub const RETURNS: Range<usize> = 4..100; // in a block: 32 x (u16 range, u8 intensity)
+    pub const RETURN_LEN: usize = 3;
+    pub const TIMESTAMP: Range<usize> = 1200..1204; // u32, microseconds past the hour
+    pub const RETURN_MODE: usize = 1204;
+    pub const PRODUCT: usize = 1205;
+}
+
+/// Flag of the blocks that carry lasers 0 to 31.
+pub const FLAG_LOWER: [u8; 2] = [0xFF, 0xEE];
+
+/// One echo as it is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RawReturn {
+    /// Range in the model's unit; 0 = no return.
+    pub range: u16,
+    /// 0 to 100 diffuse, 101 to 255 retroreflecting.
+    pub intensity: u8,
+}
+
+/// One block as it is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RawBlock {
+    /// Encoder azimuth at the first shot, 0.01 degree.
+    pub azimuth_centideg: u16,
+    /// Echoes by channel.
+    pub returns: [RawReturn; CHANNELS],
+}
+
+/// Borrowed data packet. The array type carries the length, so no accessor can fail.
+#[derive(Debug, Clone, Copy)]
+pub struct Packet<'a>(&'a [u8; LEN]);
+
+impl<'a> Packet<'a> {
+    /// Takes a payload of the right size; `None` for any other.
+    pub fn new(payload: &'a [u8]) -> Option<Self> {
+        payload.try_into().ok().map(Self)
+    }
+
+    fn block(&self, block: usize) -> &'a [u8] {
+        let start = block % BLOCKS * field::BLOCK_LEN;
+        &self.0[start..start + field::BLOCK_LEN]
+    }
+
+    /// Whether a block carries lasers 0 to 31.
+    pub fn is_lower(&self, block: usize) -> bool {
+        self.block(block)[field::FLAG] == FLAG_LOWER
+    }
+
+    /// Azimuth of a block, 0.01 degree; 36000 and above are not valid.
+    pub fn azimuth_centideg(&self, block: usize) -> u16 {
+        let bytes = &self.block(block)[field::AZIMUTH];
+        u16::from_le_bytes([bytes[0], bytes[1]])
+    }
+
+    /// Echoes of a block by channel.
+    pub fn returns(&self, block: usize) -> impl ExactSizeIterator<Item = RawReturn> + 'a {
+        let echoes = self.block(block)[field::RETURNS].chunks_exact(field::RETURN_LEN);
+        echoes.map(|bytes| RawReturn {
+            range: u16::from_le_bytes([bytes[0], bytes[1]]),
+            intensity: bytes[2],
+        })
+    }
+
+    /// Device time of the first shot, microseconds past the hour.
+    pub fn timestamp_us(&self) -> u32 {
+        let bytes = &self.0[field::TIMESTAMP];
+        u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]])
+    }
+
+    /// Byte of the return mode.
+    pub fn return_mode_byte(&self) -> u8 {
+        self.0[field::RETURN_MODE]
+    }
+
+    /// Return mode; old firmware leaves 0, which means the strongest.
+    pub fn return_mode(&self) -> ReturnMode {
+        match self.return_mode_byte() {
+            0x38 => ReturnMode::Last,
+            0x39 => ReturnMode::Dual,
+            _ => ReturnMode::Strongest,
+        }
+    }
+
+    /// Byte of the product.
+    pub fn product(&self) -> u8 {
+        self.0[field::PRODUCT]
+    }
+}
+
+/// Writes a data packet: the inverse of [`Packet`].
+pub fn encode(
+    blocks: &[RawBlock; BLOCKS],
+    timestamp_us: u32,
+    mode: ReturnMode,
+    product: u8,
+) -> [u8; LEN] {
+    let mut bytes = [0; LEN];
+    for (block, room) in blocks.iter().zip(bytes.chunks_exact_mut(field::BLOCK_LEN)) {
+        encode_block(block, room);
+    }
+    bytes[field::TIMESTAMP].copy_from_slice(&timestamp_us.to_le_bytes());
+    bytes[field::RETURN_MODE] = match mode {
+        ReturnMode::Strongest => 0x37,
+        ReturnMode::Last => 0x38,
+        ReturnMode::Dual => 0x39,
+    };
+    bytes[field::PRODUCT] = product;
+    bytes
+}
+
+fn encode_block(block: &RawBlock, room: &mut [u8]) {
+    room[field::FLAG].copy_from_slice(&FLAG_LOWER);
+    room[field::AZIMUTH].copy_from_slice(&block.azimuth_centideg.to_le_bytes());
+    let places = room[field::RETURNS].chunks_exact_mut(field::RETURN_LEN);
+    for (place, echo) in places.zip(&block.returns) {
+        place[..2].copy_from_slice(&echo.range.to_le_bytes());
+        place[2] = echo.intensity;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let mut blocks = [RawBlock::default(); BLOCKS];
+        for (number, block) in (0_u8..).zip(&mut blocks) {
+            block.azimuth_centideg = 35_900 + u16::from(number);
+            block.returns[31] = RawReturn {
+                range: 0x1234 + u16::from(number),
+                intensity: 200 + number,
+            };
+        }
+        let bytes = encode(&blocks, 3_599_999_999, ReturnMode::Dual, 0x22);
+        let packet = Packet::new(&bytes).unwrap();
+        for (number, block) in blocks.iter().enumerate() {
+            assert!(packet.is_lower(number));
+            assert_eq!(packet.azimuth_centideg(number), block.azimuth_centideg);
+            assert!(packet.returns(number).eq(block.returns));
+        }
+        assert_eq!(packet.timestamp_us(), 3_599_999_999);
+        assert_eq!(packet.return_mode(), ReturnMode::Dual);
+        assert_eq!(packet.product(), 0x22);
+        // Written out by hand from the manual: block 1, channel 31 at 100 + 4 + 93.
+        assert_eq!(bytes[197..200], [0x35, 0x12, 201]);
+        assert_eq!(bytes[100..104], [0xFF, 0xEE, 0x3D, 0x8C]);
+    }
+
+    #[test]
+    fn another_size_is_no_packet() {
+        assert!(Packet::new(&[0; LEN - 1]).is_none());
+        assert!(Packet::new(&[0; LEN + 1]).is_none());
+    }
+}

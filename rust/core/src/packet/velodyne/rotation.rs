@@ -1,0 +1,186 @@
+//! Azimuth and time along one packet: rows of equal time step, with gaps of a limited field of view.
+
+use super::TURN_CENTIDEG;
+use crate::packet::LeftOut;
+
+/// Angle of one hundredth of a degree.
+const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
+/// More rows than any packet of the family has.
+const MAX_ROWS: usize = 12;
+/// Steps back by less than this are jitter of the encoder, not a gap of nearly a turn; 0.01 degree.
+const BACKLASH_CENTIDEG: i32 = 100;
+
+/// Rows of one packet: the azimuths that it states and the times that follow from them.
+#[derive(Debug, Clone, Copy)]
+pub struct Rotation {
+    rows: usize,
+    azimuth_rad: [f64; MAX_ROWS],
+    start_ns: [i64; MAX_ROWS],
+    valid: [bool; MAX_ROWS],
+    rate_rad_per_ns: f64,
+    turned_rad: f64,
+    duration_ns: i64,
+    left_out: Option<LeftOut>,
+}
+
+impl Rotation {
+    /// Reads `rows` azimuths (0.01 degree) that follow each other every `row_ns`.
+    ///
+    /// Where one step is far off the others the sensor left out a part of the turn: the rows behind
+    /// it were shot later by the time it takes to turn through, and the rate comes from the rest.
+    pub fn new(azimuths_centideg: impl Iterator<Item = u16>, row_ns: i64) -> Self {
+        let mut raw = [0; MAX_ROWS];
+        let mut rows = 0;
+        for (place, azimuth) in raw.iter_mut().zip(azimuths_centideg) {
+            *place = azimuth;
+            rows += 1;
+        }
+        let steps = steps(&raw[..rows]);
+        let usual = median(&steps[..rows.saturating_sub(1)]);
+        let is_usual = |step: i32| (step - usual).abs() <= usual.abs() / 2 + 20;
+        let normal = steps[..rows.saturating_sub(1)]
+            .iter()
+            .filter(|step| is_usual(**step));
+        let (sum, count) = normal.fold((0, 0), |(sum, count), step| (sum + step, count + 1));
+        let row_step = f64::from(sum) / f64::from(count.max(1)); // 0.01 degree a row
+        let rate = row_step * RAD_PER_CENTIDEG / row_ns as f64;
+
+        let mut rotation = Self {
+            rows,
+            azimuth_rad: [0.0; MAX_ROWS],
+            start_ns: [0; MAX_ROWS],
+            valid: [false; MAX_ROWS],
+            rate_rad_per_ns: rate,
+            turned_rad: 0.0,
+            duration_ns: 0,
+            left_out: None,
+        };
+        let mut gap_ns = 0;
+        for row in 0..rows {
+            rotation.azimuth_rad[row] = f64::from(raw[row]) * RAD_PER_CENTIDEG;
+            rotation.valid[row] = raw[row] < TURN_CENTIDEG;
+            rotation.start_ns[row] = row as i64 * row_ns + gap_ns;
+            let step = steps[row];
+            if row + 1 < rows && !is_usual(step) && rate > 0.0 {
+                let excess_rad = (f64::from(step) - row_step) * RAD_PER_CENTIDEG;
+                rotation.leave_out((row + 1) as f64 * row_step * RAD_PER_CENTIDEG, excess_rad);
+                gap_ns += (excess_rad / rate) as i64;
+            }
+        }
+        rotation.duration_ns = rows as i64 * row_ns + gap_ns;
+        rotation.turned_rad = rate * rotation.duration_ns as f64;
+        rotation
+    }
+
+    /// Keeps the widest gap: a sensor has one field of view.
+    fn leave_out(&mut self, after_rad: f64, width_rad: f64) {
+        if self.left_out.is_none_or(|gap| gap.width_rad < width_rad) {
+            self.left_out = Some(LeftOut {
+                after_rad,
+                width_rad,
+            });
+        }
+    }
+
+    /// The part of the turn that the sensor left out within the packet.
+    pub fn left_out(&self) -> Option<LeftOut> {
+        self.left_out
+    }
+
+    /// Encoder azimuth of a row's first shot, [0, 2 pi).
+    pub fn azimuth_rad(&self, row: usize) -> f64 {
+        self.azimuth_rad[row]
+    }
+
+    /// Time of a row's first shot after the packet's stamp.
+    pub fn start_ns(&self, row: usize) -> i64 {
+        self.start_ns[row]
+    }
+
+    /// Whether the row states an azimuth within one turn.
+    pub fn is_valid(&self, row: usize) -> bool {
+        row < self.rows && self.valid[row]
+    }
+
+    /// Rotation rate within the packet.
+    pub fn rate_rad_per_ns(&self) -> f64 {
+        self.rate_rad_per_ns
+    }
+
+    /// Angle to where the next packet starts.
+    pub fn turned_rad(&self) -> f64 {
+        self.turned_rad
+    }
+
+    /// Time to where the next packet starts.
+    pub fn duration_ns(&self) -> i64 {
+        self.duration_ns
+    }
+}
+
+/// Forward steps from row to row, 0.01 degree, in [-`BACKLASH_CENTIDEG`, one turn).
+fn steps(raw: &[u16]) -> [i32; MAX_ROWS] {
+    let turn = i32::from(TURN_CENTIDEG);
+    let mut steps = [0; MAX_ROWS];
+    for (place, pair) in steps.iter_mut().zip(raw.windows(2)) {
+        let step = (i32::from(pair[1]) - i32::from(pair[0])).rem_euclid(turn);
+        *place = if step > turn - BACKLASH_CENTIDEG {
+            step - turn
+        } else {
+            step
+        };
+    }
+    steps
+}
+
+fn median(steps: &[i32]) -> i32 {
+    let mut sorted = [0; MAX_ROWS];
+    let sorted = &mut sorted[..steps.len()];
+    sorted.copy_from_slice(steps);
+    sorted.sort_unstable();
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ROW_NS: i64 = 110_592;
+
+    fn degrees(angle_rad: f64) -> f64 {
+        angle_rad.to_degrees()
+    }
+
+    #[test]
+    fn the_seam_is_no_gap() {
+        let rotation = Rotation::new((0..12).map(|row| (35_800 + row * 40) % 36_000), ROW_NS);
+        assert!((degrees(rotation.rate_rad_per_ns()) * ROW_NS as f64 - 0.4).abs() < 1e-9);
+        assert_eq!(rotation.duration_ns(), 12 * ROW_NS);
+        assert!((degrees(rotation.turned_rad()) - 4.8).abs() < 1e-9);
+        assert_eq!(rotation.azimuth_rad(5), 0.0);
+    }
+
+    #[test]
+    fn a_gap_of_the_field_of_view_does_not_bend_the_rest() {
+        // 0.4 degrees a row; between rows 4 and 5 the sensor leaves out 180 degrees.
+        let azimuth = |row: u16| (26_000 + row * 40 + if row > 4 { 18_000 } else { 0 }) % 36_000;
+        let rotation = Rotation::new((0..12).map(azimuth), ROW_NS);
+        assert!((degrees(rotation.rate_rad_per_ns()) * ROW_NS as f64 - 0.4).abs() < 1e-9);
+        // 180 degrees at 0.4 degrees a row are 450 rows.
+        let late = rotation.start_ns(5) - 5 * ROW_NS;
+        assert!((late - 450 * ROW_NS).abs() <= 1, "{late}");
+        assert_eq!(rotation.start_ns(4), 4 * ROW_NS);
+        assert!((degrees(rotation.turned_rad()) - 184.8).abs() < 1e-6);
+        let gap = rotation.left_out().unwrap();
+        assert!((degrees(gap.after_rad) - 2.0).abs() < 1e-9);
+        assert!((degrees(gap.width_rad) - 180.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_standing_rotor_and_noise_are_survived() {
+        let standing = Rotation::new([7, 7, 6, 7, 7, 7].into_iter(), ROW_NS);
+        assert!(standing.rate_rad_per_ns().abs() * (ROW_NS as f64) < 1e-4);
+        let noise = Rotation::new([65_535, 0, 36_000, 12, 40_000, 3].into_iter(), ROW_NS);
+        assert!(!noise.is_valid(0) && noise.is_valid(1) && !noise.is_valid(6));
+    }
+}
