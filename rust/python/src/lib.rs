@@ -10,11 +10,13 @@ mod arrays;
 mod compute;
 #[allow(dead_code)]
 mod error;
+mod synthetic;
 
 use pyo3::prelude::*;
 
 /// The compiled part of `lidar_deflect`; private, its public face is the Python package.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    synthetic::register(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }
