@@ -68,6 +68,11 @@ class Paper(Model):
     plane: Literal["xoz", "yoz", "auto"] = Field(
         default="auto", description="step 10: xoz | yoz | auto (the two axes that deform most)"
     )
+    tip_max_u_m: Positive = Field(
+        default=5.0,
+        description="step 10: a tip less certain than this along the span is ill-posed, by the "
+        "scatter of the contour samples alone",
+    )
     overhead_m: NotNegative = Field(
         default=1.5,
         description="step 12: overhead when the blade is nearer than this to the vertical above "

@@ -6,7 +6,7 @@
 from lidar_deflect.tables.build import Values, build, check, empty
 from lidar_deflect.tables.catalogue import RETURN_KINDS, SCHEMA_VERSION, SCHEMAS, STATUSES
 from lidar_deflect.tables.describe import json_schema, markdown
-from lidar_deflect.tables.files import HASH_KEY, configuration_hash, metadata, read, write
+from lidar_deflect.tables.files import HASH_KEY, metadata, read, write
 from lidar_deflect.tables.schema import UTC_NS, Column, Table, nearest_hint
 
 __all__ = [
@@ -21,7 +21,6 @@ __all__ = [
     "Values",
     "build",
     "check",
-    "configuration_hash",
     "empty",
     "json_schema",
     "markdown",

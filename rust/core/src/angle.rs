@@ -14,6 +14,15 @@ pub fn wrap_half_turn(angle_rad: f64) -> f64 {
     wrap_turn(angle_rad + PI) - PI
 }
 
+/// An interval of azimuth, from `from_rad` on in the sense of rotation.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Arc {
+    /// Start, [0, 2 pi).
+    pub from_rad: f64,
+    /// Width, from 0.
+    pub width_rad: f64,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -117,6 +117,63 @@ impl<F> PointCloud<F> {
         self.block.push(echo.block);
     }
 
+    /// Appends echoes, column by column.
+    pub fn extend(&mut self, echoes: &[Return]) {
+        self.xyz_m.extend(echoes.iter().map(|echo| echo.xyz_m));
+        self.time_ns.extend(echoes.iter().map(|echo| echo.time.0));
+        self.range_m.extend(echoes.iter().map(|echo| echo.range_m));
+        self.azimuth_rad
+            .extend(echoes.iter().map(|echo| echo.azimuth_rad));
+        self.ring.extend(echoes.iter().map(|echo| echo.ring));
+        self.intensity
+            .extend(echoes.iter().map(|echo| echo.intensity));
+        self.return_index
+            .extend(echoes.iter().map(|echo| echo.return_index));
+        self.return_kind
+            .extend(echoes.iter().map(|echo| echo.return_kind));
+        self.packet.extend(echoes.iter().map(|echo| echo.packet));
+        self.block.extend(echoes.iter().map(|echo| echo.block));
+    }
+
+    /// Removes all echoes and keeps the memory.
+    pub fn clear(&mut self) {
+        self.xyz_m.clear();
+        self.time_ns.clear();
+        self.range_m.clear();
+        self.azimuth_rad.clear();
+        self.ring.clear();
+        self.intensity.clear();
+        self.return_index.clear();
+        self.return_kind.clear();
+        self.packet.clear();
+        self.block.clear();
+    }
+
+    /// Azimuths in degrees, [0, 360).
+    pub fn azimuth_deg(&self) -> Vec<f32> {
+        let degrees = |azimuth_rad: &f32| f64::from(*azimuth_rad).to_degrees() as f32;
+        self.azimuth_rad.iter().map(degrees).collect()
+    }
+
+    /// Meanings of the returns as numbers: the place of each in the declaration of [`ReturnKind`].
+    pub fn return_kind_codes(&self) -> Vec<u8> {
+        self.return_kind.iter().map(|kind| *kind as u8).collect()
+    }
+
+    /// Makes room for `additional` more echoes.
+    pub fn reserve(&mut self, additional: usize) {
+        self.xyz_m.reserve(additional);
+        self.time_ns.reserve(additional);
+        self.range_m.reserve(additional);
+        self.azimuth_rad.reserve(additional);
+        self.ring.reserve(additional);
+        self.intensity.reserve(additional);
+        self.return_index.reserve(additional);
+        self.return_kind.reserve(additional);
+        self.packet.reserve(additional);
+        self.block.reserve(additional);
+    }
+
     /// Carries all positions into another frame; the other columns move along unchanged.
     pub fn transform<To>(self, to_from: &RigidTransform<To, F>) -> PointCloud<To> {
         let carry = |[x, y, z]: [f32; 3]| {

@@ -12,9 +12,15 @@ pub mod cloud;
 pub mod frame;
 
 pub mod capture;
+pub mod clock;
+pub mod loss;
 pub mod packet;
+pub mod stream;
+pub mod sweep;
 
 pub mod fit;
 pub mod neighbors;
 
 pub mod cluster;
+
+pub mod synthetic;

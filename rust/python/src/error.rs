@@ -1,6 +1,7 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
-use lidar_deflect_core::error::{Coded, InvalidValue};
+use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue};
+use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -35,7 +36,19 @@ macro_rules! translate {
 }
 
 translate! {
+    CaptureError => "CaptureError",
     InvalidValue => "InvalidValueError",
+}
+
+/// A missing file is also Python's own `FileNotFoundError`.
+impl From<FileError> for BorderError {
+    fn from(error: FileError) -> Self {
+        let class = match error.is_not_found() {
+            true => "CaptureNotFoundError",
+            false => "CaptureError",
+        };
+        Self(raise(class, &error))
+    }
 }
 
 /// An instance of `lidar_deflect.errors.<class>` with message, code and hint.

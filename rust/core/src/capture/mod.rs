@@ -1,8 +1,37 @@
 //! From the bytes of a capture to UDP datagrams.
+//!
+//! Records come out of a file ([`RecordReader`]: pcap or pcapng), datagrams out of records
+//! ([`Assembler`]: link layer, IP, fragments, UDP); [`DatagramReader`] joins the two. [`PcapWriter`]
+//! goes the other way. Nothing here opens a file, and no input of bytes panics.
 
 use std::net::SocketAddr;
 
 use crate::time::Timestamp;
+
+mod facts;
+mod order;
+mod window;
+
+mod pcap;
+mod pcapng;
+mod record;
+
+mod assembly;
+mod fragments;
+mod ip;
+mod link;
+
+mod assembler;
+mod reader;
+
+mod frame;
+mod writer;
+
+pub use assembler::{Assembler, Found};
+pub use facts::{CaptureFacts, CaptureWarning, Format, FragmentFacts};
+pub use reader::DatagramReader;
+pub use record::{MAX_RECORD_LEN, Record, RecordReader};
+pub use writer::PcapWriter;
 
 /// One UDP datagram, put together from its fragments.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -7,7 +7,7 @@
 pub mod beams;
 pub mod velodyne;
 
-use crate::angle::wrap_turn;
+use crate::angle::{Arc, wrap_turn};
 use crate::cloud::Return;
 use crate::drops::Drops;
 use crate::error::InvalidValue;
@@ -39,6 +39,12 @@ pub trait Model: Sync + std::fmt::Debug {
 
     /// What `payload` is to this model, judged by the bytes that identify it; `None` when it is not its own.
     fn recognise(&self, payload: &[u8]) -> Option<PacketKind>;
+
+    /// Whether the identifying bytes are this model's alone, so that the packet period need not
+    /// confirm what [`Model::recognise`] says.
+    fn is_sure(&self, _payload: &[u8]) -> bool {
+        true
+    }
 
     /// Whether `payload` has the layout of a data packet, whatever its identifying bytes say: for
     /// models that the user names, and to tell how close a foreign packet comes.
@@ -133,11 +139,59 @@ pub struct Head {
     pub rate_rad_per_ns: f64,
     /// Time from the first shot of this packet to the start of the next when nothing is lost.
     pub duration_ns: i64,
+    /// Part of the turn within the packet that the sensor left out: its limited field of view.
+    pub left_out: Option<LeftOut>,
     /// Which returns it carries.
     pub return_mode: ReturnMode,
 }
 
+/// A gap of a limited field of view inside of a packet.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LeftOut {
+    /// Angle turned from the packet's first shot to the gap.
+    pub after_rad: f64,
+    /// Width of the gap.
+    pub width_rad: f64,
+}
+
 impl Head {
+    /// Angle that was seen between two angles turned since the first shot.
+    pub fn seen_rad(&self, from_rad: f64, to_rad: f64) -> f64 {
+        let left_out = self.left_out.map_or(0.0, |gap| {
+            let end_rad = gap.after_rad + gap.width_rad;
+            (to_rad.min(end_rad) - from_rad.max(gap.after_rad)).max(0.0)
+        });
+        (to_rad - from_rad - left_out).max(0.0)
+    }
+
+    /// Arcs that were seen: one, or one on each side of the part that was left out.
+    pub fn arcs(&self) -> impl Iterator<Item = Arc> {
+        let arc = |after_rad: f64, until_rad: f64| Arc {
+            from_rad: wrap_turn(self.azimuth_rad + after_rad),
+            width_rad: until_rad - after_rad,
+        };
+        let arcs = match self.left_out {
+            None => [Some(arc(0.0, self.turned_rad)), None],
+            Some(gap) => {
+                let behind_rad = gap.after_rad + gap.width_rad;
+                [
+                    Some(arc(0.0, gap.after_rad)),
+                    Some(arc(behind_rad, self.turned_rad)),
+                ]
+            }
+        };
+        arcs.into_iter().flatten()
+    }
+
+    /// When the rotor had turned by `turned_rad` since the first shot at `start`.
+    pub fn time_at(&self, start: Timestamp, turned_rad: f64) -> Timestamp {
+        if self.rate_rad_per_ns > 0.0 {
+            start + (turned_rad / self.rate_rad_per_ns).round() as i64
+        } else {
+            start
+        }
+    }
+
     /// Where the next packet starts when nothing is lost, [0, 2 pi).
     pub fn next_azimuth_rad(&self) -> f64 {
         wrap_turn(self.azimuth_rad + self.turned_rad)
@@ -184,7 +238,7 @@ impl Decoded {
 }
 
 /// Decodes the data packets of one stream; may carry state from packet to packet.
-pub trait Decoder: Send {
+pub trait Decoder: Send + Sync {
     /// Appends the returns of `payload` to `out`; a payload of another size gives none and is counted.
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded);
 }

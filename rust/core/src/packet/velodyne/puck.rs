@@ -129,6 +129,10 @@ impl Model for Puck {
         (is_mode && is_product && packet.is_lower(0)).then_some(PacketKind::Data)
     }
 
+    fn is_sure(&self, payload: &[u8]) -> bool {
+        Packet::new(payload).is_some_and(|packet| packet.product() != PRODUCT_HDL32E)
+    }
+
     fn fits(&self, payload: &[u8]) -> bool {
         Packet::new(payload).is_some()
     }
@@ -157,6 +161,7 @@ impl Model for Puck {
             turned_rad: rotation.turned_rad(),
             rate_rad_per_ns: rotation.rate_rad_per_ns(),
             duration_ns: rotation.duration_ns(),
+            left_out: rotation.left_out(),
             return_mode: packet.return_mode(),
         })
     }

@@ -1,6 +1,7 @@
 //! Azimuth and time along one packet: rows of equal time step, with gaps of a limited field of view.
 
 use super::TURN_CENTIDEG;
+use crate::packet::LeftOut;
 
 /// Angle of one hundredth of a degree.
 const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
@@ -19,6 +20,7 @@ pub struct Rotation {
     rate_rad_per_ns: f64,
     turned_rad: f64,
     duration_ns: i64,
+    left_out: Option<LeftOut>,
 }
 
 impl Rotation {
@@ -51,6 +53,7 @@ impl Rotation {
             rate_rad_per_ns: rate,
             turned_rad: 0.0,
             duration_ns: 0,
+            left_out: None,
         };
         let mut gap_ns = 0;
         for row in 0..rows {
@@ -60,12 +63,28 @@ impl Rotation {
             let step = steps[row];
             if row + 1 < rows && !is_usual(step) && rate > 0.0 {
                 let excess_rad = (f64::from(step) - row_step) * RAD_PER_CENTIDEG;
+                rotation.leave_out((row + 1) as f64 * row_step * RAD_PER_CENTIDEG, excess_rad);
                 gap_ns += (excess_rad / rate) as i64;
             }
         }
         rotation.duration_ns = rows as i64 * row_ns + gap_ns;
         rotation.turned_rad = rate * rotation.duration_ns as f64;
         rotation
+    }
+
+    /// Keeps the widest gap: a sensor has one field of view.
+    fn leave_out(&mut self, after_rad: f64, width_rad: f64) {
+        if self.left_out.is_none_or(|gap| gap.width_rad < width_rad) {
+            self.left_out = Some(LeftOut {
+                after_rad,
+                width_rad,
+            });
+        }
+    }
+
+    /// The part of the turn that the sensor left out within the packet.
+    pub fn left_out(&self) -> Option<LeftOut> {
+        self.left_out
     }
 
     /// Encoder azimuth of a row's first shot, [0, 2 pi).
@@ -152,6 +171,9 @@ mod tests {
         assert!((late - 450 * ROW_NS).abs() <= 1, "{late}");
         assert_eq!(rotation.start_ns(4), 4 * ROW_NS);
         assert!((degrees(rotation.turned_rad()) - 184.8).abs() < 1e-6);
+        let gap = rotation.left_out().unwrap();
+        assert!((degrees(gap.after_rad) - 2.0).abs() < 1e-9);
+        assert!((degrees(gap.width_rad) - 180.0).abs() < 1e-9);
     }
 
     #[test]

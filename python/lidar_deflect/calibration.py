@@ -1,0 +1,214 @@
+"""Poses of all lidars with the evidence they rest on, and their file `calibration.toml`."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import tomlkit
+
+from lidar_deflect.errors import CalibrationError
+from lidar_deflect.files import write_text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+SCHEMA = "lidar-deflect.calibration/1"
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Pose of one lidar.
+
+    Attributes
+    ----------
+    id, source
+        The lidar, as the configuration names it and as its packets are addressed.
+    world_from_sensor
+        Shape (4, 4), metres; the sensor frame is that of the vendor's driver.
+    evidence
+        What it rests on: numbers and words, by name.
+    covariance
+        Shape (6, 6), order wx wy wz tx ty tz: R_true = Exp(w) R, t_true = t + dt, about the world
+        axes (rad, m). None where the method gives none.
+    """
+
+    id: str
+    source: str
+    world_from_sensor: NDArray[np.float64]
+    evidence: Mapping[str, Any] = field(default_factory=dict)
+    covariance: NDArray[np.float64] | None = None
+
+    @property
+    def position_m(self) -> NDArray[np.float64]:
+        """Optical centre in the world frame, shape (3,)."""
+        return self.world_from_sensor[:3, 3]
+
+
+@dataclass(frozen=True, repr=False)
+class Calibration:
+    """Poses of all lidars, how they were found, and the unloaded blade where it was seen.
+
+    Attributes
+    ----------
+    poses
+        One per lidar.
+    method
+        ``closed_form`` (steps 1-4 of the paper).
+    warnings
+        What a user should know before trusting it.
+    reference
+        State of the unloaded blade by measuring method, so that a run without an unloaded hold can
+        be measured; empty where none was seen.
+    """
+
+    poses: tuple[Pose, ...]
+    method: str
+    warnings: tuple[str, ...] = ()
+    reference: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        names = ", ".join(pose.id for pose in self.poses)
+        return f"Calibration({self.method}: {names}; {len(self.warnings)} warnings)"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{self.summary()}</pre>"
+
+    def pose(self, id: str) -> Pose:
+        """Return the pose of one lidar.
+
+        Raises
+        ------
+        CalibrationError
+            If the calibration has no such lidar.
+        """
+        for pose in self.poses:
+            if pose.id == id:
+                return pose
+        raise CalibrationError(
+            f"the calibration has no lidar {id!r}",
+            code="calibration.unknown_lidar",
+            facts=[("lidars", ", ".join(pose.id for pose in self.poses))],
+            hint="calibrate with the configuration of this test",
+        )
+
+    def summary(self) -> str:
+        """One page for people."""
+        lines = [f"calibration ({self.method.replace('_', ' ')})"]
+        for pose in self.poses:
+            x, y, z = pose.position_m
+            lines.append(f"  {pose.id:8} at {x:9.3f} {y:8.3f} {z:9.3f} m")
+            lines += [f"    {name}: {_said(value)}" for name, value in pose.evidence.items()]
+        lines += [f"  warning: {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain document of `calibration.toml`."""
+        return {
+            "schema": SCHEMA,
+            "method": self.method,
+            "warnings": list(self.warnings),
+            "lidars": [_pose_to_dict(pose) for pose in self.poses],
+        } | ({"reference": _plain(dict(self.reference))} if self.reference else {})
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write `calibration.toml`, under a temporary name first."""
+        return write_text(Path(path), tomlkit.dumps(self.to_dict()), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Calibration:
+        """Read `calibration.toml`.
+
+        Raises
+        ------
+        CalibrationError
+            If the file is missing, no TOML, or not a calibration.
+        """
+        path = Path(path)
+        try:
+            document = tomllib.loads(path.read_text(encoding="utf-8"))
+            if document["schema"] != SCHEMA:
+                raise KeyError("schema")
+            poses = tuple(_pose_from_dict(entry) for entry in document["lidars"])
+        except (OSError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError) as error:
+            raise CalibrationError(
+                f"{path} is no calibration",
+                code="calibration.file",
+                facts=[("found", _why(error)), ("expected", f'schema = "{SCHEMA}"')],
+                hint=f"make one: lidar-deflect calibrate -c test.toml CAPTURE -o {path.name}",
+            ) from error
+        return cls(
+            poses,
+            str(document.get("method", "unknown")),
+            tuple(document.get("warnings", ())),
+            document.get("reference", {}),
+        )
+
+
+def _pose_to_dict(pose: Pose) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "id": pose.id,
+        "source": pose.source,
+        "world_from_sensor": pose.world_from_sensor.tolist(),
+    }
+    if pose.covariance is not None:
+        entry["covariance"] = pose.covariance.tolist()
+    return entry | {"evidence": _plain(dict(pose.evidence))}
+
+
+def _pose_from_dict(entry: Mapping[str, Any]) -> Pose:
+    covariance = entry.get("covariance")
+    return Pose(
+        str(entry["id"]),
+        str(entry["source"]),
+        np.array(entry["world_from_sensor"], dtype=np.float64).reshape(4, 4),
+        entry.get("evidence", {}),
+        None if covariance is None else np.array(covariance, dtype=np.float64).reshape(6, 6),
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Without arrays, numpy scalars and None, which TOML does not know."""
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items() if entry is not None}
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _said(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_said(entry) for entry in value) + "]"
+    return str(value)
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, KeyError):
+        return f"no or another {error.args[0]}"
+    return str(error).splitlines()[0] if str(error) else type(error).__name__
+
+
+def with_reference(
+    calibration: Calibration, method: str, reference: Mapping[str, Any]
+) -> Calibration:
+    """Return the calibration with the unloaded state of the blade under one more method."""
+    return Calibration(
+        calibration.poses,
+        calibration.method,
+        calibration.warnings,
+        {**calibration.reference, method: _plain(dict(reference))},
+    )
+
+
+def join_warnings(parts: Sequence[Sequence[str]]) -> tuple[str, ...]:
+    """All warnings in order, each once."""
+    return tuple(dict.fromkeys(warning for part in parts for warning in part))

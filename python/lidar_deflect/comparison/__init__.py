@@ -1,0 +1,27 @@
+"""Measured deflections against draw wires, predictions, truth and other runs.
+
+`compare` makes the table, `save` keeps it, `table1` and `table2` set the paper's tables as text;
+`recognise` says what a reference was taken for.
+"""
+
+from lidar_deflect.comparison.compare import ComparisonWarning, compare, save
+from lidar_deflect.comparison.error import error_percent
+from lidar_deflect.comparison.methods import by_method, largest_step
+from lidar_deflect.comparison.reference import KINDS, Kind, Reference, recognise
+from lidar_deflect.comparison.text import aligned, table1, table2
+
+__all__ = [
+    "KINDS",
+    "ComparisonWarning",
+    "Kind",
+    "Reference",
+    "aligned",
+    "by_method",
+    "compare",
+    "error_percent",
+    "largest_step",
+    "recognise",
+    "save",
+    "table1",
+    "table2",
+]

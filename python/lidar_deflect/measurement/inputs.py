@@ -1,0 +1,54 @@
+"""What every method starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from lidar_deflect.calibration import Calibration
+    from lidar_deflect.capture import Capture
+    from lidar_deflect.config import Config
+    from lidar_deflect.measurement.unloaded import HoldCloud
+
+    Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What every method starts from.
+
+    Attributes
+    ----------
+    lidars
+        Ids of the lidars that are in the capture, in the order of the configuration.
+    clouds
+        What each of them saw in the unloaded hold; empty where this capture has none.
+    unloaded_ns
+        When that hold is, nanoseconds since 1970 UTC; None where this capture has none.
+    start_ns, stop_ns
+        Limits of the measurement.
+    rate_hz
+        States per second.
+    progress
+        Told the stage, what is done and what there is to do.
+    """
+
+    config: Config
+    capture: Capture
+    calibration: Calibration
+    lidars: tuple[str, ...]
+    clouds: Mapping[str, HoldCloud]
+    unloaded_ns: tuple[int, int] | None
+    start_ns: int
+    stop_ns: int
+    rate_hz: float
+    progress: Progress | None = None
+    threads: int | None = None
+
+    def listener(self, stage: str) -> Callable[[int, int], None] | None:
+        """Return who is told the progress of one stage, or None where nobody listens."""
+        progress = self.progress
+        return None if progress is None else lambda done, total: progress(stage, done, total)

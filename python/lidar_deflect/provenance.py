@@ -1,0 +1,108 @@
+"""What a run was made of, for run.json: program, inputs, clocks, drops, gates."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import time
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+    from pathlib import Path
+
+    import polars as pl
+
+    from lidar_deflect.config import Config
+    from lidar_deflect.measurement import Inputs, States
+    from lidar_deflect.pipeline import Setup
+
+SCHEMA = "lidar-deflect.run/1"
+HASH_BLOCK = 1 << 20
+LIBRARIES = ("numpy", "polars")
+
+
+class Stopwatch:
+    """Seconds of each stage of a run."""
+
+    def __init__(self) -> None:
+        self._last = time.perf_counter()
+        self.laps: dict[str, float] = {}
+
+    def lap(self, stage: str) -> None:
+        """End a stage."""
+        now = time.perf_counter()
+        self.laps[stage] = now - self._last
+        self._last = now
+
+
+def run_document(
+    setup: Setup,
+    inputs: Inputs,
+    states: States,
+    method: str,
+    health: pl.DataFrame,
+    watch: Stopwatch,
+) -> Mapping[str, Any]:
+    """Document of run.json."""
+    return {
+        "schema": SCHEMA,
+        "versions": versions(),
+        "test": setup.config.test.id,
+        "method": method,
+        "inputs": [file_facts(path) for path in setup.paths],
+        "capture": setup.capture.info(),
+        "absent_lidars": list(setup.absent),
+        "calibration": {
+            "method": inputs.calibration.method,
+            "warnings": list(inputs.calibration.warnings),
+        },
+        "evidence": states.evidence,
+        "warnings": [*inputs.calibration.warnings, *states.warnings],
+        "timings_s": {stage: round(seconds, 3) for stage, seconds in watch.laps.items()},
+        "gates": gates(setup.config, health, setup.absent),
+    }
+
+
+def versions() -> Mapping[str, str]:
+    """Versions of this program and of what its numbers depend on."""
+    return {
+        "lidar-deflect": version("lidar-deflect"),
+        "python": platform.python_version(),
+        **{name: version(name) for name in LIBRARIES},
+    }
+
+
+def file_facts(path: Path) -> Mapping[str, Any]:
+    """Name, size and SHA-256 of an input file."""
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(HASH_BLOCK):
+            digest.update(block)
+    return {"file": path.name, "bytes": path.stat().st_size, "sha256": digest.hexdigest()}
+
+
+def gates(config: Config, health: pl.DataFrame, absent: Sequence[str]) -> Mapping[str, Any]:
+    """Judge a run by the limits of ``[gates]`` and by what should have been there.
+
+    Returns
+    -------
+    Mapping
+        ``failed``: sentences; ``lost_percent``: per lidar.
+    """
+    lost = _lost_percent(health)
+    limit = config.gates.max_lost_percent
+    failed = [f"lidar {id} never sent" for id in absent]
+    failed += [
+        f"lidar {id} lost {percent:.2f} % of its packets, the limit is {limit:g} %"
+        for id, percent in lost.items()
+        if percent > limit
+    ]
+    return {"failed": failed, "lost_percent": lost}
+
+
+def _lost_percent(health: pl.DataFrame) -> dict[str, float]:
+    sums = health.group_by("lidar", maintain_order=True).sum()
+    sent = zip(sums["lidar"], sums["lost"], sums["packets"], strict=True)
+    return {id: 100.0 * lost / max(1, lost + packets) for id, lost, packets in sent}

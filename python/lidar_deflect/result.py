@@ -1,0 +1,154 @@
+"""A measurement's tables with their provenance, and the folder that keeps them."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lidar_deflect import config as configs
+from lidar_deflect import tables
+from lidar_deflect.calibration import Calibration
+from lidar_deflect.errors import ResultNotFoundError
+from lidar_deflect.files import whole_folder
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    import polars as pl
+
+    from lidar_deflect.config import Config
+    from lidar_deflect.plots import Plots
+
+TABLES = ("deflection", "steps", "contour", "points", "rejected", "health", "channels")
+"""Tables of every result folder; others (`comparison`, `cycles`, `poses`) join where they exist."""
+
+
+@dataclass(frozen=True, repr=False)
+class Result:
+    """What a measurement gave.
+
+    Attributes
+    ----------
+    frames
+        The tables by name, as docs/tables.md declares them.
+    run
+        Document of run.json: versions, inputs, decisions, timings, drops, gates.
+    config, calibration
+        What it was measured with.
+    """
+
+    frames: Mapping[str, pl.DataFrame]
+    run: Mapping[str, Any]
+    config: Config
+    calibration: Calibration
+    folder: Path | None = field(default=None, compare=False)
+
+    def __repr__(self) -> str:
+        sections = self.deflection["section"].n_unique()
+        return (
+            f"Result({self.config.test.id}: {sections} sections, {self.steps.height} step rows, "
+            f"{self.deflection.height} states, method {self.run['method']})"
+        )
+
+    def _repr_html_(self) -> str:
+        html: str = self.steps._repr_html_()
+        return f"<p>{self!r}</p>{html}"
+
+    @property
+    def deflection(self) -> pl.DataFrame:
+        """One row per time and section."""
+        return self.frames["deflection"]
+
+    @property
+    def steps(self) -> pl.DataFrame:
+        """One row per load step and section."""
+        return self.frames["steps"]
+
+    @property
+    def contour(self) -> pl.DataFrame:
+        """Blade line over time."""
+        return self.frames["contour"]
+
+    @property
+    def points(self) -> pl.DataFrame:
+        """Some of the blade's points."""
+        return self.frames["points"]
+
+    @property
+    def rejected(self) -> pl.DataFrame:
+        """Objects that did not count."""
+        return self.frames["rejected"]
+
+    @property
+    def health(self) -> pl.DataFrame:
+        """Packets and points per second and lidar."""
+        return self.frames["health"]
+
+    @property
+    def channels(self) -> pl.DataFrame:
+        """Every read channel."""
+        return self.frames["channels"]
+
+    @property
+    def failed_gates(self) -> tuple[str, ...]:
+        """Quality gates that this run did not pass, as sentences."""
+        return tuple(self.run["gates"]["failed"])
+
+    @property
+    def plot(self) -> Plots:
+        """Figures of this result."""
+        from lidar_deflect.plots import Plots  # plotly only for those who plot
+
+        return Plots(self)
+
+    def save(self, folder: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the result folder: complete, or not at all.
+
+        Raises
+        ------
+        OutputError
+            If it exists and may not be overwritten, or cannot be written.
+        """
+        folder = Path(folder)
+        with whole_folder(folder, overwrite=overwrite) as part:
+            metadata = {tables.HASH_KEY: configs.config_hash(self.config)}
+            for name, frame in self.frames.items():
+                tables.write(frame, part / f"{name}.parquet", metadata)
+            (part / "test.toml").write_text(configs.dump(self.config), encoding="utf-8")
+            self.calibration.save(part / "calibration.toml")
+            document = json.dumps(self.run, indent=2, ensure_ascii=False)
+            (part / "run.json").write_text(document + "\n", encoding="utf-8")
+        return folder
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Result:
+        """Read a result folder.
+
+        Raises
+        ------
+        ResultNotFoundError
+            If it is not one.
+        """
+        folder = Path(folder)
+        missing = [
+            name
+            for name in ("run.json", "test.toml", "calibration.toml", "deflection.parquet")
+            if not (folder / name).is_file()
+        ]
+        if missing:
+            raise ResultNotFoundError(
+                f"{folder} is no result folder",
+                code="result.not_found",
+                facts=[("missing", ", ".join(missing))],
+                hint="make one: lidar-deflect measure -c test.toml CAPTURE -o results/",
+            )
+        frames = {path.stem: tables.read(path) for path in sorted(folder.glob("*.parquet"))}
+        return cls(
+            frames,
+            json.loads((folder / "run.json").read_text(encoding="utf-8")),
+            configs.load(folder / "test.toml"),
+            Calibration.load(folder / "calibration.toml"),
+            folder,
+        )

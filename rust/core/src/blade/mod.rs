@@ -1,0 +1,3 @@
+//! The blade: what its scan lines show of it.
+
+pub mod contour;

@@ -1,0 +1,228 @@
+//! The data packets of one lidar as they arrive: unrolled in time, put in order, gaps measured.
+
+use super::report::Pause;
+use crate::angle::Arc;
+use crate::clock::Unroller;
+use crate::loss::order::{Order, Passed, Stamp, Strays, Verdict};
+use crate::loss::view::FieldOfView;
+use crate::packet::{Head, ModelRef};
+use crate::time::Timestamp;
+
+/// What is kept of a packet beside its payload.
+#[derive(Debug, Clone, Copy)]
+pub struct Ticket {
+    pub arrival: Timestamp,
+    /// Device time without roll-over.
+    pub device: Timestamp,
+    pub head: Head,
+    /// Number among the stream's data packets in the order of arrival.
+    pub packet: u32,
+}
+
+/// A packet in its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Ordered {
+    pub ticket: Ticket,
+    pub gap: Option<Gap>,
+    pub is_late: bool,
+    pub is_jump: bool,
+    /// Jumps of the clock before it.
+    pub segment: usize,
+}
+
+/// Packets missing before one.
+#[derive(Debug, Clone, Copy)]
+pub struct Gap {
+    pub lost: u64,
+    /// Device time where the first of them began.
+    pub from: Timestamp,
+    /// Time of one packet.
+    pub period_ns: i64,
+    /// What they would have seen.
+    pub arc: Arc,
+    /// Host time around them.
+    pub arrivals: (Timestamp, Timestamp),
+}
+
+impl Gap {
+    /// Packets that were sent and are missing: not those outside of the field of view, and none for
+    /// pauses of the recording.
+    pub fn lost_in(&self, view: &FieldOfView, pauses: &[Pause]) -> u64 {
+        let (before, after) = self.arrivals;
+        let is_pause = |pause: &Pause| pause.from >= before && pause.to <= after;
+        if pauses.iter().rev().any(is_pause) {
+            return 0;
+        }
+        (self.lost as f64 * view.visible_share(self.arc)).round() as u64
+    }
+}
+
+/// What became of a packet on arrival.
+#[derive(Debug, Clone, Copy)]
+pub enum Arrival {
+    Next(Ordered),
+    Held,
+    Duplicate,
+    TooLate { was_lost: bool },
+    Clash,
+}
+
+/// The state of one lidar's stream; `T` is kept with packets that wait.
+#[derive(Debug)]
+pub struct Arrivals<T> {
+    model: ModelRef,
+    clock: Unroller,
+    sequence: Option<Unroller>,
+    order: Option<Order<(Ticket, T)>>,
+    period_ns: i64,
+    packets: u32,
+    segment: usize,
+    last: Option<Last>,
+}
+
+/// Where the last passed packet ended.
+#[derive(Debug, Clone, Copy)]
+struct Last {
+    end: Timestamp,
+    azimuth_rad: f64,
+    arrival: Timestamp,
+}
+
+impl<T> Arrivals<T> {
+    pub fn new(model: ModelRef) -> Self {
+        let counting = model.counting();
+        let sequence_wrap = counting.sequence_bits.map(|bits| 1_i64 << bits.min(62));
+        Self {
+            model,
+            clock: Unroller::new(counting.clock_wrap_ns),
+            sequence: sequence_wrap.map(|wrap| Unroller::new(Some(wrap))),
+            order: None,
+            period_ns: 1,
+            packets: 0,
+            segment: 0,
+            last: None,
+        }
+    }
+
+    /// Takes a data packet; `mark` stands for its content.
+    pub fn offer(
+        &mut self,
+        arrival: Timestamp,
+        head: &Head,
+        mark: u64,
+        keep: impl FnOnce() -> T,
+    ) -> (Ticket, Arrival) {
+        let ticket = Ticket {
+            arrival,
+            device: self.clock.unroll(arrival, head.device_ns),
+            head: *head,
+            packet: self.packets,
+        };
+        self.packets = self.packets.wrapping_add(1);
+        let stamp = self.stamp(&ticket, mark);
+        let period_ns = self.model.period_ns(head.return_mode).max(1);
+        let step = if self.sequence.is_some() {
+            1
+        } else {
+            period_ns
+        };
+        self.period_ns = period_ns;
+        let order = self
+            .order
+            .get_or_insert_with(|| Order::new(step, period_ns));
+        order.set_step(step, period_ns);
+        let verdict = order.offer(arrival, stamp, || (ticket, keep()));
+        let arrival = match verdict {
+            Verdict::Next { is_late } => Arrival::Next(self.pass(ticket, 0, is_late, false)),
+            Verdict::Held => Arrival::Held,
+            Verdict::Duplicate => Arrival::Duplicate,
+            Verdict::TooLate { was_lost } => Arrival::TooLate { was_lost },
+            Verdict::Clash => Arrival::Clash,
+        };
+        (ticket, arrival)
+    }
+
+    /// The next packet that has waited and whose turn has come.
+    pub fn pop(&mut self) -> Option<(Ordered, T)> {
+        let Passed {
+            item: (ticket, item),
+            lost,
+            is_late,
+            is_jump,
+        } = self.order.as_mut()?.pop()?;
+        Some((self.pass(ticket, lost, is_late, is_jump), item))
+    }
+
+    /// The stream has ended.
+    pub fn flush(&mut self) {
+        if let Some(order) = &mut self.order {
+            order.flush();
+        }
+    }
+
+    /// What was given up since the last call.
+    pub fn take_strays(&mut self) -> Strays {
+        self.order
+            .as_mut()
+            .map_or_else(Strays::default, Order::take_strays)
+    }
+
+    fn stamp(&mut self, ticket: &Ticket, mark: u64) -> Stamp {
+        let sequence = self.sequence.as_mut().zip(ticket.head.sequence);
+        match sequence {
+            Some((unroller, number)) => {
+                let key = unroller.unroll(Timestamp(0), i64::from(number));
+                unroller.follow(Timestamp(0), key);
+                Stamp {
+                    key: key.0,
+                    span: 1,
+                    mark,
+                }
+            }
+            None => Stamp {
+                key: ticket.device.0,
+                span: ticket.head.duration_ns,
+                mark,
+            },
+        }
+    }
+
+    fn pass(&mut self, ticket: Ticket, lost: u64, is_late: bool, is_jump: bool) -> Ordered {
+        self.segment += usize::from(is_jump);
+        self.clock.follow(ticket.arrival, ticket.device);
+        let gap = self.last.filter(|_| lost > 0).map(|last| {
+            let missing_ns = (ticket.device - last.end).max(0);
+            Gap {
+                lost,
+                from: if is_jump { ticket.device } else { last.end },
+                period_ns: self.period_ns,
+                arc: Arc {
+                    from_rad: last.azimuth_rad,
+                    width_rad: missing_ns as f64 * ticket.head.rate_rad_per_ns.max(0.0),
+                },
+                arrivals: (last.arrival, ticket.arrival),
+            }
+        });
+        self.last = Some(Last {
+            end: ticket.device + ticket.head.duration_ns,
+            azimuth_rad: ticket.head.next_azimuth_rad(),
+            arrival: ticket.arrival,
+        });
+        Ordered {
+            ticket,
+            gap,
+            is_late,
+            is_jump,
+            segment: self.segment,
+        }
+    }
+}
+
+/// A short digest of a payload, to tell a repeated packet from another one of the same time.
+pub fn mark(payload: &[u8]) -> u64 {
+    // FNV over a sample of words: both ends and every 64th byte between.
+    let sample = payload.iter().step_by(64).chain(payload.iter().take(16));
+    sample.fold(0xCBF2_9CE4_8422_2325, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01B3)
+    })
+}

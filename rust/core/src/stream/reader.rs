@@ -1,0 +1,254 @@
+//! The second pass over a capture: sweeps of all lidars, merged, in constant memory.
+
+use std::collections::{HashMap, VecDeque};
+
+use super::arrivals::{Arrival, Arrivals, Ordered, mark};
+use super::report::{Pause, ScanReport, StreamInfo};
+use super::{ScanOptions, StreamKey};
+use crate::capture::Datagram;
+use crate::clock::ClockModel;
+use crate::cloud::PointCloud;
+use crate::drops::Drops;
+use crate::error::InvalidValue;
+use crate::frame::Sensor;
+use crate::loss::view::FieldOfView;
+use crate::packet::beams::Beams;
+use crate::packet::{Decoded, Decoder, ModelRef, PacketKind, Place};
+use crate::sweep::{Placed, Sweep, SweepCutter};
+use crate::time::Timestamp;
+
+/// Which sweeps to make.
+#[derive(Debug, Clone, Default)]
+pub struct SweepOptions {
+    /// Numbers of the lidars in the report; `None`: all.
+    pub lidars: Option<Vec<usize>>,
+    /// Azimuths at which sweeps are cut, by number of the lidar; 0 where there is none.
+    pub cut_rad: Vec<f64>,
+    /// Beams of single units, by number of the lidar.
+    pub beams: Vec<(usize, Beams)>,
+    /// Packets before this are left out.
+    pub start: Option<Timestamp>,
+    /// Packets from this on are left out.
+    pub stop: Option<Timestamp>,
+}
+
+/// Turns datagrams into sweeps.
+pub struct SweepReader {
+    options: ScanOptions,
+    lanes: HashMap<StreamKey, Lane>,
+    ready: VecDeque<Sweep>,
+    decoded: Decoded,
+    limits: Limits,
+    pauses: Vec<Pause>,
+}
+
+#[derive(Clone, Copy)]
+struct Limits {
+    start: Option<Timestamp>,
+    stop: Option<Timestamp>,
+}
+
+struct Lane {
+    model: ModelRef,
+    is_named: bool,
+    arrivals: Arrivals<Vec<u8>>,
+    decoder: Box<dyn Decoder>,
+    clock: ClockModel,
+    view: FieldOfView,
+    cutter: SweepCutter,
+    spare: Vec<Vec<u8>>,
+    is_done: bool,
+}
+
+impl SweepReader {
+    /// Prepares for the capture that `report` was made of.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] for a lidar that the report does not have, or beams that do not fit its model.
+    pub fn new(report: &ScanReport, options: &SweepOptions) -> Result<Self, InvalidValue> {
+        let all: Vec<usize> = (0..report.lidars.len()).collect();
+        let mut lanes = HashMap::new();
+        for number in options.lidars.as_ref().unwrap_or(&all) {
+            let info = report.lidars.get(*number).ok_or_else(|| InvalidValue {
+                name: "lidar",
+                expected: format!("a number below {}", report.lidars.len()),
+                found: number.to_string(),
+            })?;
+            lanes.insert(info.key, Lane::new(*number, info, options)?);
+        }
+        Ok(Self {
+            options: report.options.clone(),
+            lanes,
+            ready: VecDeque::new(),
+            decoded: Decoded::default(),
+            limits: Limits {
+                start: options.start,
+                stop: options.stop,
+            },
+            pauses: report.pauses.clone(),
+        })
+    }
+
+    /// Takes the next datagram; ask [`SweepReader::pop`] afterwards.
+    pub fn push(&mut self, datagram: &Datagram<'_>) {
+        let key = self.options.key(datagram);
+        let Some(lane) = self.lanes.get_mut(&key).filter(|lane| !lane.is_done) else {
+            return;
+        };
+        if !lane.is_data(datagram.payload) {
+            return;
+        }
+        let mut step = Step {
+            decoded: &mut self.decoded,
+            ready: &mut self.ready,
+            limits: self.limits,
+            pauses: &self.pauses,
+        };
+        lane.push(datagram, &mut step);
+    }
+
+    /// The next complete sweep.
+    pub fn pop(&mut self) -> Option<Sweep> {
+        self.ready.pop_front()
+    }
+
+    /// Whether [`SweepReader::pop`] would give a sweep.
+    pub fn has_ready(&self) -> bool {
+        !self.ready.is_empty()
+    }
+
+    /// Whether all lidars have passed the end that was asked for, so that reading on is no use.
+    pub fn is_done(&self) -> bool {
+        self.lanes.values().all(|lane| lane.is_done)
+    }
+
+    /// The capture has ended: what waits and the sweeps that are not complete come out.
+    pub fn finish(&mut self) {
+        let mut step = Step {
+            decoded: &mut self.decoded,
+            ready: &mut self.ready,
+            limits: self.limits,
+            pauses: &self.pauses,
+        };
+        let mut lanes: Vec<&mut Lane> = self.lanes.values_mut().collect();
+        lanes.sort_by_key(|lane| lane.cutter.lidar());
+        for lane in lanes {
+            lane.finish(&mut step);
+        }
+    }
+
+    /// Gives the memory of a sweep back for the next ones of its lidar.
+    pub fn recycle(&mut self, lidar: usize, cloud: PointCloud<Sensor>) {
+        let mut lanes = self.lanes.values_mut();
+        if let Some(lane) = lanes.find(|lane| lane.cutter.lidar() == lidar) {
+            lane.cutter.recycle(cloud);
+        }
+    }
+
+    /// Second returns that were merged into the first so far.
+    pub fn merged(&self) -> u64 {
+        self.decoded.merged
+    }
+
+    /// Blocks that were left out so far, by reason.
+    pub fn drops(&self) -> &Drops {
+        &self.decoded.drops
+    }
+}
+
+/// What a lane borrows of the reader.
+struct Step<'a> {
+    decoded: &'a mut Decoded,
+    ready: &'a mut VecDeque<Sweep>,
+    limits: Limits,
+    pauses: &'a [Pause],
+}
+
+impl Lane {
+    fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, InvalidValue> {
+        let own = options.beams.iter().find(|(lidar, _)| *lidar == number);
+        let beams = own.map_or_else(|| info.model.beams(), |(_, beams)| beams.clone());
+        let cut_rad = options.cut_rad.get(number).copied().unwrap_or(0.0);
+        let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
+        Ok(Self {
+            model: info.model,
+            is_named: info.is_named,
+            arrivals: Arrivals::new(info.model),
+            decoder: info.model.decoder(&beams)?,
+            clock: info.clock.clone(),
+            view: info.view.clone(),
+            cutter: SweepCutter::new(number, cut_rad, visible_rad),
+            spare: Vec::new(),
+            is_done: false,
+        })
+    }
+
+    fn is_data(&self, payload: &[u8]) -> bool {
+        if self.is_named {
+            self.model.fits(payload)
+        } else {
+            self.model.recognise(payload) == Some(PacketKind::Data)
+        }
+    }
+
+    fn push(&mut self, datagram: &Datagram<'_>, step: &mut Step<'_>) {
+        let payload = datagram.payload;
+        let Some(head) = self.model.head(payload) else {
+            return;
+        };
+        let spare = &mut self.spare;
+        let keep = || {
+            let mut copy = spare.pop().unwrap_or_default();
+            copy.clear();
+            copy.extend_from_slice(payload);
+            copy
+        };
+        let (_, what) = self
+            .arrivals
+            .offer(datagram.time, &head, mark(payload), keep);
+        if let Arrival::Next(ordered) = what {
+            self.take(&ordered, payload, step);
+        }
+        self.drain(step);
+    }
+
+    fn drain(&mut self, step: &mut Step<'_>) {
+        while let Some((ordered, payload)) = self.arrivals.pop() {
+            self.take(&ordered, &payload, step);
+            self.spare.push(payload);
+        }
+    }
+
+    fn take(&mut self, ordered: &Ordered, payload: &[u8], step: &mut Step<'_>) {
+        let ticket = &ordered.ticket;
+        let time = self.clock.utc(ordered.segment, ticket.device);
+        if self.is_done || step.limits.stop.is_some_and(|stop| time >= stop) {
+            // The clock only goes back at a jump; a packet behind it would be of another time.
+            self.is_done = true;
+            return;
+        }
+        let gap = ordered.gap.as_ref();
+        let placed = Placed {
+            time,
+            head: ticket.head,
+            lost: gap.map_or(0, |gap| gap.lost_in(&self.view, step.pauses)),
+            is_jump: ordered.is_jump,
+        };
+        if step.limits.start.is_some_and(|start| time < start) {
+            return self.cutter.skip(&placed);
+        }
+        step.decoded.clear();
+        let place = Place {
+            time,
+            packet: ticket.packet,
+        };
+        self.decoder.decode(payload, place, step.decoded);
+        self.cutter.push(&placed, step.decoded, step.ready);
+    }
+
+    fn finish(&mut self, step: &mut Step<'_>) {
+        self.arrivals.flush();
+        self.drain(step);
+        self.cutter.finish(step.ready);
+    }
+}

@@ -1,0 +1,281 @@
+//! Cuts a stream of returns into sweeps, one per turn: a state machine without input or output.
+
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
+use crate::angle::{wrap_half_turn, wrap_turn};
+use crate::cloud::PointCloud;
+use crate::frame::Sensor;
+use crate::packet::{Decoded, Head};
+use crate::time::Timestamp;
+
+/// One turn of one lidar.
+#[derive(Debug, Clone)]
+pub struct Sweep {
+    /// Number of the lidar among those of the capture.
+    pub lidar: usize,
+    /// Number of the turn since the lidar's first packet; turns of which nothing arrived are counted too.
+    pub index: u32,
+    /// Returns in the order of the shots.
+    pub cloud: PointCloud<Sensor>,
+    /// When the rotor passed the cut, or the first packet began.
+    pub start: Timestamp,
+    /// When the rotor passed the cut again, or the last packet ended.
+    pub end: Timestamp,
+    /// Share of the turn whose packets arrived; of what the sensor sends where its view is limited.
+    pub coverage: f32,
+    /// Packets that began in it.
+    pub packets: u32,
+    /// Packets of it that were lost.
+    pub lost: u32,
+    /// Stretches of time from which packets are lost.
+    pub gaps: Vec<Gap>,
+}
+
+/// A stretch of time from which packets are lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gap {
+    /// When the first lost packet began.
+    pub from: Timestamp,
+    /// When the next packet that arrived began.
+    pub to: Timestamp,
+}
+
+/// One packet in its place, for the cutter.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed {
+    /// UTC of its first shot.
+    pub time: Timestamp,
+    /// Its times and angles.
+    pub head: Head,
+    /// Packets that are missing before it.
+    pub lost: u64,
+    /// The clock jumped before it: nothing is known of how far the rotor turned.
+    pub is_jump: bool,
+}
+
+/// Cuts at one azimuth.
+#[derive(Debug)]
+pub struct SweepCutter {
+    lidar: usize,
+    cut_rad: f64,
+    visible_rad: f64,
+    open: Option<Open>,
+    /// Where the last packet ended.
+    end: Option<End>,
+    spare: Vec<PointCloud<Sensor>>,
+}
+
+/// Where a packet ended: azimuth counted on over all turns, and time.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    turned_rad: f64,
+    time: Timestamp,
+}
+
+impl End {
+    fn of(packet: &Placed, start_rad: f64) -> Self {
+        Self {
+            turned_rad: start_rad + packet.head.turned_rad.max(0.0),
+            time: packet.time + packet.head.duration_ns,
+        }
+    }
+}
+
+/// The sweep that is being filled.
+#[derive(Debug)]
+struct Open {
+    turn: u32,
+    cloud: PointCloud<Sensor>,
+    start: Timestamp,
+    seen_rad: f64,
+    packets: u32,
+    lost: u32,
+    gaps: Vec<Gap>,
+}
+
+impl SweepCutter {
+    /// Cuts at encoder azimuth `cut_rad`; `visible_rad` is the angle of the turn that the sensor sends.
+    pub fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self {
+        Self {
+            lidar,
+            cut_rad: wrap_turn(cut_rad),
+            visible_rad: visible_rad.clamp(1e-3, TAU),
+            open: None,
+            end: None,
+            spare: Vec::new(),
+        }
+    }
+
+    /// Number of the lidar.
+    pub fn lidar(&self) -> usize {
+        self.lidar
+    }
+
+    /// Follows the rotor over a packet whose returns are not wanted.
+    pub fn skip(&mut self, packet: &Placed) {
+        let start_rad = self.place(packet);
+        self.end = Some(End::of(packet, start_rad));
+    }
+
+    /// Gives the memory of a sweep back for the next ones.
+    pub fn recycle(&mut self, mut cloud: PointCloud<Sensor>) {
+        cloud.clear();
+        self.spare.push(cloud);
+    }
+
+    /// Adds one packet; finished sweeps are appended to `out`.
+    pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep>) {
+        let start_rad = self.place(packet);
+        let end_rad = start_rad + packet.head.turned_rad.max(0.0);
+        let lost_behind_cut = self.add_lost(packet, start_rad);
+        let first_turn = turn_of(start_rad);
+        let gap = self.end.filter(|_| packet.lost > 0);
+        let gap = gap.map(|end| Gap { from: end.time, to: packet.time });
+        if self.open.as_ref().is_none_or(|open| open.turn < first_turn) {
+            // A gap over the cut belongs to the sweeps on both sides.
+            self.add_gap(gap);
+            self.close(self.end.map_or(packet.time, |end| end.time), out);
+            self.open(first_turn, packet.time);
+        }
+        self.add_gap(gap);
+        if let Some(open) = &mut self.open {
+            open.packets += 1;
+            open.lost = open.lost.saturating_add(lost_behind_cut);
+        }
+        self.fill(packet, decoded, start_rad, end_rad, out);
+        self.end = Some(End::of(packet, start_rad));
+    }
+
+    /// The sweep that is not complete yet, at the end of the stream.
+    pub fn finish(&mut self, out: &mut VecDeque<Sweep>) {
+        if let Some(end) = self.end {
+            self.close(end.time, out);
+        }
+    }
+
+    /// Azimuth of the packet's start after the cut, counted on over all turns since the first packet:
+    /// the one nearest to where time says that the rotor must be.
+    fn place(&self, packet: &Placed) -> f64 {
+        let after_cut_rad = wrap_turn(packet.head.azimuth_rad - self.cut_rad);
+        let Some(end) = self.end else {
+            return after_cut_rad;
+        };
+        if packet.is_jump {
+            return f64::from(turn_of(end.turned_rad) + 1) * TAU + after_cut_rad;
+        }
+        let paused_ns = (packet.time - end.time).max(0) as f64;
+        let expected_rad = end.turned_rad + paused_ns * packet.head.rate_rad_per_ns.max(0.0);
+        expected_rad + wrap_half_turn(after_cut_rad - wrap_turn(expected_rad))
+    }
+
+    /// Counts missing packets before the cut to the open sweep; gives those of the turn that the
+    /// packet begins in. Turns of which nothing arrived keep theirs.
+    fn add_lost(&mut self, packet: &Placed, start_rad: f64) -> u32 {
+        let (Some(open), Some(end)) = (&mut self.open, self.end) else {
+            return 0;
+        };
+        let gap_rad = (start_rad - end.turned_rad).max(1e-9);
+        let until = |turn: u32| {
+            let share = (f64::from(turn) * TAU - end.turned_rad) / gap_rad;
+            (packet.lost as f64 * share.clamp(0.0, 1.0)).round() as u32
+        };
+        let here = until(open.turn.saturating_add(1));
+        open.lost = open.lost.saturating_add(here);
+        let whole = until(turn_of(start_rad)).max(here);
+        u32::try_from(packet.lost)
+            .unwrap_or(u32::MAX)
+            .saturating_sub(whole)
+    }
+
+    fn add_gap(&mut self, gap: Option<Gap>) {
+        if let Some(open) = &mut self.open {
+            open.gaps.extend(gap);
+        }
+    }
+
+    fn open(&mut self, turn: u32, start: Timestamp) {
+        let cloud = self.spare.pop().unwrap_or_default();
+        self.open = Some(Open {
+            turn,
+            cloud,
+            start,
+            seen_rad: 0.0,
+            packets: 0,
+            lost: 0,
+            gaps: Vec::new(),
+        });
+    }
+
+    fn close(&mut self, end: Timestamp, out: &mut VecDeque<Sweep>) {
+        let Some(open) = self.open.take() else { return };
+        out.push_back(Sweep {
+            lidar: self.lidar,
+            index: open.turn,
+            cloud: open.cloud,
+            start: open.start,
+            end,
+            coverage: (open.seen_rad / self.visible_rad).min(1.0) as f32,
+            packets: open.packets,
+            lost: open.lost,
+            gaps: open.gaps,
+        });
+    }
+
+    /// Adds the packet's returns, cutting where it passes the cut.
+    fn fill(
+        &mut self,
+        packet: &Placed,
+        decoded: &Decoded,
+        start_rad: f64,
+        end_rad: f64,
+        out: &mut VecDeque<Sweep>,
+    ) {
+        let mut from = 0;
+        let mut from_rad = start_rad;
+        while let Some(open) = &mut self.open {
+            let cut_rad = (f64::from(open.turn) + 1.0) * TAU;
+            if end_rad < cut_rad {
+                break;
+            }
+            let to = from + before(decoded, from, packet, cut_rad - start_rad);
+            open.cloud.extend(&decoded.returns[from..to]);
+            open.seen_rad += packet
+                .head
+                .seen_rad(from_rad - start_rad, cut_rad - start_rad);
+            let time = packet.head.time_at(packet.time, cut_rad - start_rad);
+            let turn = open.turn + 1;
+            self.close(time, out);
+            self.open(turn, time);
+            (from, from_rad) = (to, cut_rad);
+        }
+        if let Some(open) = &mut self.open {
+            open.cloud.extend(&decoded.returns[from..]);
+            open.seen_rad += packet
+                .head
+                .seen_rad(from_rad - start_rad, end_rad - start_rad);
+        }
+    }
+}
+
+fn turn_of(turned_rad: f64) -> u32 {
+    (turned_rad / TAU).floor().max(0.0) as u32
+}
+
+/// How many of the returns from number `from` on were shot before the rotor had turned by `cut_rad`
+/// since the packet's start.
+fn before(decoded: &Decoded, from: usize, packet: &Placed, cut_rad: f64) -> usize {
+    let start_rad = packet.head.azimuth_rad;
+    let is_before = |encoder_rad: &f32| {
+        let turned_rad = wrap_turn(f64::from(*encoder_rad) - start_rad + BACKLASH_RAD);
+        turned_rad - BACKLASH_RAD < cut_rad
+    };
+    let encoder = &decoded.encoder_rad[from..];
+    encoder
+        .iter()
+        .position(|e| !is_before(e))
+        .unwrap_or(encoder.len())
+}
+
+/// The encoder may seem to step back by so much.
+const BACKLASH_RAD: f64 = 0.02;
