@@ -52,8 +52,15 @@ pub fn direction(
 ) -> BorderResult<Unit<Vector3<f64>>> {
     let values = column(name, array, 3)?;
     let vector = Vector3::new(values[0], values[1], values[2]);
-    Unit::try_new(vector, 1e-9).filter(|unit| unit.iter().all(|v| v.is_finite())).ok_or_else(|| {
-        let found = format!("{values:?}");
-        InvalidValue { name, expected: "a direction of finite length".into(), found }.into()
-    })
+    Unit::try_new(vector, 1e-9)
+        .filter(|unit| unit.iter().all(|v| v.is_finite()))
+        .ok_or_else(|| {
+            let found = format!("{values:?}");
+            InvalidValue {
+                name,
+                expected: "a direction of finite length".into(),
+                found,
+            }
+            .into()
+        })
 }
