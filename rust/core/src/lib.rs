@@ -17,3 +17,5 @@ pub mod loss;
 pub mod packet;
 pub mod stream;
 pub mod sweep;
+
+pub mod synthetic;
