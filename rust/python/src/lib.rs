@@ -10,6 +10,7 @@ mod capture;
 #[allow(dead_code)]
 mod compute;
 mod error;
+mod synthetic;
 
 use pyo3::prelude::*;
 
@@ -17,5 +18,6 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     capture::register(module)?;
+    synthetic::register(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }
