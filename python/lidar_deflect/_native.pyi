@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CaptureScan",
-    "Simulation",
     "Sweep",
+    "Simulation",
     "SweepIterator",
     "__version__",
     "check_captures",
@@ -97,6 +97,7 @@ class SweepIterator(Iterator[Sweep]):
     def __next__(self) -> Sweep: ...
     @property
     def merged(self) -> int: ...
+
 
 def reference_blades() -> list[str]: ...
 

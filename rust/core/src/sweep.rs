@@ -28,6 +28,17 @@ pub struct Sweep {
     pub packets: u32,
     /// Packets of it that were lost.
     pub lost: u32,
+    /// Stretches of time from which packets are lost.
+    pub gaps: Vec<Gap>,
+}
+
+/// A stretch of time from which packets are lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gap {
+    /// When the first lost packet began.
+    pub from: Timestamp,
+    /// When the next packet that arrived began.
+    pub to: Timestamp,
 }
 
 /// One packet in its place, for the cutter.
@@ -80,6 +91,7 @@ struct Open {
     seen_rad: f64,
     packets: u32,
     lost: u32,
+    gaps: Vec<Gap>,
 }
 
 impl SweepCutter {
@@ -118,10 +130,15 @@ impl SweepCutter {
         let end_rad = start_rad + packet.head.turned_rad.max(0.0);
         let lost_behind_cut = self.add_lost(packet, start_rad);
         let first_turn = turn_of(start_rad);
+        let gap = self.end.filter(|_| packet.lost > 0);
+        let gap = gap.map(|end| Gap { from: end.time, to: packet.time });
         if self.open.as_ref().is_none_or(|open| open.turn < first_turn) {
+            // A gap over the cut belongs to the sweeps on both sides.
+            self.add_gap(gap);
             self.close(self.end.map_or(packet.time, |end| end.time), out);
             self.open(first_turn, packet.time);
         }
+        self.add_gap(gap);
         if let Some(open) = &mut self.open {
             open.packets += 1;
             open.lost = open.lost.saturating_add(lost_behind_cut);
@@ -171,6 +188,12 @@ impl SweepCutter {
             .saturating_sub(whole)
     }
 
+    fn add_gap(&mut self, gap: Option<Gap>) {
+        if let Some(open) = &mut self.open {
+            open.gaps.extend(gap);
+        }
+    }
+
     fn open(&mut self, turn: u32, start: Timestamp) {
         let cloud = self.spare.pop().unwrap_or_default();
         self.open = Some(Open {
@@ -180,6 +203,7 @@ impl SweepCutter {
             seen_rad: 0.0,
             packets: 0,
             lost: 0,
+            gaps: Vec::new(),
         });
     }
 
@@ -194,6 +218,7 @@ impl SweepCutter {
             coverage: (open.seen_rad / self.visible_rad).min(1.0) as f32,
             packets: open.packets,
             lost: open.lost,
+            gaps: open.gaps,
         });
     }
 
