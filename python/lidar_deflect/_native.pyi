@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CaptureScan",
-    "Sweep",
     "Simulation",
+    "Sweep",
     "SweepIterator",
     "__version__",
     "check_captures",
@@ -97,7 +97,6 @@ class SweepIterator(Iterator[Sweep]):
     def __next__(self) -> Sweep: ...
     @property
     def merged(self) -> int: ...
-
 
 def reference_blades() -> list[str]: ...
 
