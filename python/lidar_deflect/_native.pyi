@@ -14,8 +14,8 @@ __all__ = [
     "DistancePass",
     "FrameParams",
     "FramePlan",
-    "Sweep",
     "Simulation",
+    "Sweep",
     "SweepIterator",
     "__version__",
     "check_captures",
@@ -104,7 +104,6 @@ class SweepIterator(Iterator[Sweep]):
     def __next__(self) -> Sweep: ...
     @property
     def merged(self) -> int: ...
-
 
 def reference_blades() -> list[str]: ...
 
