@@ -144,7 +144,7 @@ fn check(samples_m: &[[f64; 3]], labels: &[i32]) -> Result<(), FitError> {
         let reason = format!("{} samples but {} labels", samples_m.len(), labels.len());
         return Err(FitError::Degenerate { shape, reason });
     }
-    crate::fit::all_finite(shape, samples_m.iter().map(|p| p.as_slice()))
+    crate::fit::all_finite(shape, samples_m.iter().map(<[f64; 3]>::as_slice))
 }
 
 fn describe(

@@ -3,7 +3,7 @@
 use crate::error::InvalidValue;
 use crate::neighbors::checked_radius;
 
-/// Eps = mu tan(alpha) MinPts d + beta, equation (10) of Hu et al. 2024.
+/// `Eps = mu tan(alpha) MinPts d + beta`, equation (10) of Hu et al. 2024.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RadiusModel {
     slope: f64,

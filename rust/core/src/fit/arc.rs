@@ -72,7 +72,7 @@ const KRONROD: [f64; 8] = [
 const GAUSS: [f64; 4] = [
     0.129_484_966_168_869_7,
     0.279_705_391_489_276_66,
-    0.381_830_050_505_118_95,
+    0.381_830_050_505_118_9,
     0.417_959_183_673_469_4,
 ];
 /// Intervals after which a length is given up; contours of blades take a handful.

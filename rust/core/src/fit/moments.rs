@@ -55,7 +55,7 @@ impl Moments {
         }
     }
 
-    /// Chan, Golub, LeVeque 1979: no cancellation however far the cloud lies from the origin.
+    /// Chan, Golub, `LeVeque` 1979: no cancellation however far the cloud lies from the origin.
     fn merged(self, other: Self) -> Self {
         let count = self.count + other.count;
         let arm = other.mean - self.mean;

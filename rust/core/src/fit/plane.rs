@@ -13,7 +13,7 @@ const SAME_SCATTER: f64 = 1.0 - 1e-6;
 /// Least ratio of the middle to the largest scatter: below, the points lie on a line.
 const ON_A_LINE: f64 = 1e-12;
 
-/// normal . p + offset_m = 0.
+/// `normal . p + offset_m = 0`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plane {
     /// Unit normal.

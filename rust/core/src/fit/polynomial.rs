@@ -183,7 +183,7 @@ fn check(abscissas: &[f64], ordinates: &[f64], degree: usize) -> Result<usize, F
         .zip(ordinates)
         .map(|(&t, &x)| [t, x])
         .collect();
-    all_finite(SHAPE, pairs.iter().map(|pair| pair.as_slice()))?;
+    all_finite(SHAPE, pairs.iter().map(<[f64; 2]>::as_slice))?;
     let different = count_different(abscissas);
     if different < unknowns {
         return degenerate(format!(
