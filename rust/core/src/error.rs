@@ -31,7 +31,70 @@ impl Coded for InvalidValue {
     }
 }
 
-<<<<<<< HEAD
+/// Bytes that are not the capture they should be. What stood before them has been read.
+#[derive(Debug, Clone, Error, PartialEq, Eq)]
+pub enum CaptureError {
+    /// The first bytes are not those of pcap or pcapng.
+    #[error("not a capture: expected the first bytes of pcap or pcapng, found {found}")]
+    UnknownFormat {
+        /// The first bytes in hexadecimal, or what they look like.
+        found: String,
+    },
+    /// A version of a format that is not known.
+    #[error("byte {offset} of the capture: expected {expected}, found {found}")]
+    Version {
+        /// Byte of the uncompressed capture.
+        offset: u64,
+        /// Versions that can be read.
+        expected: &'static str,
+        /// The version of the capture.
+        found: String,
+    },
+    /// Garbage where a record should be.
+    #[error("record {record} (byte {offset} of the capture): expected {expected}, found {found}")]
+    Damaged {
+        /// Number of the record, 0-based.
+        record: u64,
+        /// Byte of the uncompressed capture.
+        offset: u64,
+        /// What a sound capture has there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// The reader failed: disk, network or decompression.
+    #[error("byte {offset} of the capture cannot be read: {reason}")]
+    Read {
+        /// Byte of the uncompressed capture.
+        offset: u64,
+        /// What the reader says.
+        reason: String,
+    },
+}
+
+impl Coded for CaptureError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::UnknownFormat { .. } => "capture.unknown_format",
+            Self::Version { .. } => "capture.version",
+            Self::Damaged { .. } => "capture.damaged",
+            Self::Read { .. } => "capture.read",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        let hint = match self {
+            Self::UnknownFormat { .. } => "record with tcpdump or Wireshark, as pcap or pcapng",
+            Self::Version { .. } => "save it anew with Wireshark: File, Save As, pcapng",
+            Self::Damaged { .. } => {
+                "the capture is damaged from this byte on; copy it anew, or cut it before this record"
+            }
+            Self::Read { .. } => "copy the capture anew and compare the sizes",
+        };
+        Some(hint.into())
+    }
+}
+
 /// A point cloud that cannot be searched or clustered.
 #[derive(Debug, Clone, Error, PartialEq)]
 pub enum ClusterError {
@@ -136,61 +199,10 @@ impl Coded for FitError {
             Self::NotFinite { .. } => "fit.not_finite",
             Self::NotConverged { .. } => "fit.not_converged",
             Self::NoCluster { .. } => "fit.no_cluster",
-=======
-/// Bytes that are not the capture they should be. What stood before them has been read.
-#[derive(Debug, Clone, Error, PartialEq, Eq)]
-pub enum CaptureError {
-    /// The first bytes are not those of pcap or pcapng.
-    #[error("not a capture: expected the first bytes of pcap or pcapng, found {found}")]
-    UnknownFormat {
-        /// The first bytes in hexadecimal, or what they look like.
-        found: String,
-    },
-    /// A version of a format that is not known.
-    #[error("byte {offset} of the capture: expected {expected}, found {found}")]
-    Version {
-        /// Byte of the uncompressed capture.
-        offset: u64,
-        /// Versions that can be read.
-        expected: &'static str,
-        /// The version of the capture.
-        found: String,
-    },
-    /// Garbage where a record should be.
-    #[error("record {record} (byte {offset} of the capture): expected {expected}, found {found}")]
-    Damaged {
-        /// Number of the record, 0-based.
-        record: u64,
-        /// Byte of the uncompressed capture.
-        offset: u64,
-        /// What a sound capture has there.
-        expected: String,
-        /// What is there.
-        found: String,
-    },
-    /// The reader failed: disk, network or decompression.
-    #[error("byte {offset} of the capture cannot be read: {reason}")]
-    Read {
-        /// Byte of the uncompressed capture.
-        offset: u64,
-        /// What the reader says.
-        reason: String,
-    },
-}
-
-impl Coded for CaptureError {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::UnknownFormat { .. } => "capture.unknown_format",
-            Self::Version { .. } => "capture.version",
-            Self::Damaged { .. } => "capture.damaged",
-            Self::Read { .. } => "capture.read",
->>>>>>> main
         }
     }
 
     fn hint(&self) -> Option<String> {
-<<<<<<< HEAD
         match self {
             Self::TooFew { .. } => Some("take more points or a lower degree".into()),
             Self::Degenerate { .. } => Some("take points that spread wider".into()),
@@ -198,16 +210,5 @@ impl Coded for CaptureError {
             Self::NotConverged { .. } => Some("a larger tolerance or a shorter stretch".into()),
             Self::NoCluster { .. } => Some("a larger clustering radius or fewer points".into()),
         }
-=======
-        let hint = match self {
-            Self::UnknownFormat { .. } => "record with tcpdump or Wireshark, as pcap or pcapng",
-            Self::Version { .. } => "save it anew with Wireshark: File, Save As, pcapng",
-            Self::Damaged { .. } => {
-                "the capture is damaged from this byte on; copy it anew, or cut it before this record"
-            }
-            Self::Read { .. } => "copy the capture anew and compare the sizes",
-        };
-        Some(hint.into())
->>>>>>> main
     }
 }

@@ -22,5 +22,9 @@ pub mod fit;
 pub mod neighbors;
 
 pub mod cluster;
+pub mod register;
+
+pub mod blade;
+pub mod paper;
 
 pub mod synthetic;
