@@ -17,3 +17,14 @@ pub mod loss;
 pub mod packet;
 pub mod stream;
 pub mod sweep;
+
+pub mod fit;
+pub mod neighbors;
+
+pub mod cluster;
+pub mod register;
+
+pub mod blade;
+pub mod paper;
+
+pub mod synthetic;

@@ -1,1 +1,13 @@
-//! Opens captures for `lidar-deflect-core`.
+//! Opens captures for `lidar-deflect-core`: paths, compression, rotated and parallel files.
+
+mod container;
+mod error;
+mod gzip;
+mod source;
+
+mod member;
+mod set;
+
+pub use error::{FileError, Foreign};
+pub use member::FileFacts;
+pub use set::CaptureSet;

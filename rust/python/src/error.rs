@@ -1,6 +1,8 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
 use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue};
+use lidar_deflect_core::register::wall::WallError;
+use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -37,6 +39,18 @@ macro_rules! translate {
 translate! {
     CaptureError => "CaptureError",
     InvalidValue => "InvalidValueError",
+    WallError => "CalibrationError",
+}
+
+/// A missing file is also Python's own `FileNotFoundError`.
+impl From<FileError> for BorderError {
+    fn from(error: FileError) -> Self {
+        let class = match error.is_not_found() {
+            true => "CaptureNotFoundError",
+            false => "CaptureError",
+        };
+        Self(raise(class, &error))
+    }
 }
 
 /// An instance of `lidar_deflect.errors.<class>` with message, code and hint.

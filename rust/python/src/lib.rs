@@ -3,18 +3,22 @@
 //! A binding function borrows, computes without the interpreter lock, and hands over; it holds no
 //! loop over points and no formula.
 
-// The first binding functions use them.
-#[allow(dead_code)]
 mod arrays;
-#[allow(dead_code)]
+mod capture;
 mod compute;
-#[allow(dead_code)]
 mod error;
+mod paper;
+mod register;
+mod synthetic;
 
 use pyo3::prelude::*;
 
 /// The compiled part of `lidar_deflect`; private, its public face is the Python package.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    capture::register(module)?;
+    paper::register(module)?;
+    register::register(module)?;
+    synthetic::register(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

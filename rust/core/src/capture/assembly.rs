@@ -80,7 +80,7 @@ impl Assembly {
             None => !more && stop < self.buffer.len(),
         };
         // Only the last fragment may end off a multiple of 8: no other could follow it.
-        known_end || stop > MAX_LEN || len == 0 || (more && len % 8 != 0)
+        known_end || stop > MAX_LEN || len == 0 || (more && !len.is_multiple_of(8))
     }
 
     /// Copies those parts of `body` that have not come yet. `false`: all had.

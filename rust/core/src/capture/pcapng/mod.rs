@@ -144,7 +144,7 @@ impl Section {
     /// Total length of the block at the window's start, checked.
     fn total_len(&self, bytes: &[u8], offset: u64, limit: u32) -> Step<u32> {
         let total = self.order.u32_at(bytes, 4);
-        if (12..=limit).contains(&total) && total % 4 == 0 {
+        if (12..=limit).contains(&total) && total.is_multiple_of(4) {
             return Ok(total);
         }
         let expected = format!("a block length between 12 and {limit}, a multiple of 4");

@@ -1,0 +1,403 @@
+//! A whole test: from the plan of a scene to packets and truth.
+
+use std::io::{self, Write};
+
+use nalgebra::{Rotation3, Vector3};
+use rayon::prelude::*;
+
+use super::blade::{Blade, BuildErrors, Orientation};
+use super::body::{Body, Pose, Saddle};
+use super::echo::{Optics, View};
+use super::lidar::{Lidar, LidarPlan, PACKET_NS};
+use super::motion::{Motion, Schedule, Sway};
+use super::network::{Arrival, Fate, NetworkPlan};
+use super::random::{Stream, Subject};
+use super::reference::Stations;
+use super::rod::Node;
+use super::sight::Sight;
+use super::solver::{Loads, Pull};
+use super::terrain::{Crate, Ground, GroundPlan, Terrain, Wall};
+use super::truth::{self, SectionTruth};
+use crate::capture::PcapWriter;
+use crate::error::InvalidValue;
+use crate::packet::ReturnMode;
+use crate::packet::velodyne::{BLOCKS, CHANNELS, RawBlock, encode, puck};
+use crate::time::Timestamp;
+
+/// Where a winch pulls.
+#[derive(Debug, Clone, Copy)]
+pub struct SaddlePlan {
+    /// Arc length, metres.
+    pub s_m: f64,
+    /// Force at full load, N.
+    pub force_n: f64,
+    /// Where the cable is fixed, from the axis along chord and towards the suction side, metres.
+    pub lever_m: [f64; 2],
+    /// End of the cable at the winch, metres.
+    pub anchor_m: Vector3<f64>,
+}
+
+/// Everything that a simulated test is made of.
+#[derive(Debug, Clone)]
+pub struct ScenePlan {
+    /// Seed of all that is drawn.
+    pub seed: u64,
+    /// UTC of scene time 0.
+    pub start: Timestamp,
+    /// The drawing of the blade.
+    pub stations: Stations,
+    /// How it is clamped.
+    pub orientation: Orientation,
+    /// How far the built blade may differ.
+    pub errors: BuildErrors,
+    /// Direction of the pull, world frame.
+    pub direction: Vector3<f64>,
+    /// Whether the pull turns with the section.
+    pub follower: bool,
+    /// Pulls.
+    pub saddles: Vec<SaddlePlan>,
+    /// Whether the saddles' frames can be seen.
+    pub show_saddles: bool,
+    /// Radius of the cables, metres; 0 = none.
+    pub cable_radius_m: f64,
+    /// Load steps.
+    pub schedule: Schedule,
+    /// Modes in which the blade sways.
+    pub sways: Vec<Sway>,
+    /// Rotation of the root at full load, rad about the world axes.
+    pub root_turn_rad: Vector3<f64>,
+    /// The ground.
+    pub ground: GroundPlan,
+    /// A wall.
+    pub wall: Option<Wall>,
+    /// Boxes.
+    pub boxes: Vec<Crate>,
+    /// Sensors.
+    pub lidars: Vec<LidarPlan>,
+    /// Optics of all sensors.
+    pub optics: Optics,
+    /// The network.
+    pub network: NetworkPlan,
+}
+
+/// Distance of the solver's nodes, metres.
+const SPACING_M: f64 = 0.25;
+/// Time between states of the blade; in between it moves evenly.
+const STATE_NS: i64 = 10_000_000;
+/// Scene time of one step of [`Simulation::advance`].
+const WINDOW_NS: i64 = 25 * STATE_NS;
+const GRAVITY_M_S2: f64 = 9.81;
+
+/// A test under way.
+#[derive(Debug)]
+pub struct Simulation {
+    /// The sensors as they stand.
+    pub lidars: Vec<Lidar>,
+    /// What stands around.
+    pub terrain: Terrain,
+    /// The blade as built.
+    pub blade: Blade,
+    motion: Motion,
+    body: Body,
+    plan: ScenePlan,
+    fates: Vec<Vec<Fate>>,
+    done_ns: i64,
+    sent: Vec<u32>,
+    pending: Vec<Arrival>,
+}
+
+impl Simulation {
+    /// Builds the blade, bends it and puts up the sensors.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] where the blade cannot be clamped or bent as planned, a saddle is not on it,
+    /// or nothing lasts.
+    pub fn new(plan: ScenePlan) -> Result<Self, InvalidValue> {
+        let errors = &plan.errors;
+        let blade = Blade::build(plan.stations.clone(), &plan.orientation, errors, plan.seed)?;
+        let duration_s = plan.schedule.duration_s();
+        if !(0.1..=36_000.0).contains(&duration_s) {
+            return Err(InvalidValue {
+                name: "load",
+                expected: "holds and ramps of 0.1 s to 10 h together".into(),
+                found: format!("{duration_s} s"),
+            });
+        }
+        let places: Vec<f64> = plan.saddles.iter().map(|saddle| saddle.s_m).collect();
+        let arc_m = blade.grid(SPACING_M, &places);
+        let pulls = plan.pulls(&blade, &arc_m)?;
+        let loads = Loads {
+            pulls: pulls.clone(),
+            share: 0.0,
+            gravity_m_s2: Vector3::y() * -GRAVITY_M_S2,
+        };
+        let rod = blade.rod(&arc_m);
+        let (schedule, sways) = (plan.schedule.clone(), plan.sways.clone());
+        let motion = Motion::new(&rod, &loads, schedule, sways, plan.root_turn_rad)?;
+        let body = Body::new(&blade, &arc_m, plan.frames(&blade, &pulls));
+        let plans = plan.lidars.iter().cloned().enumerate();
+        let lidars: Vec<Lidar> = plans
+            .map(|(i, lidar)| Lidar::new(lidar, plan.seed, i, plan.start))
+            .collect();
+        let duration_ns = (duration_s * 1e9) as i64;
+        let fates = lidars.iter().enumerate().map(|(i, lidar)| {
+            let packets = lidar.packets(duration_ns);
+            plan.network
+                .fates(plan.seed, i, packets, PACKET_NS as f64 * 1e-9)
+        });
+        Ok(Self {
+            fates: fates.collect(),
+            sent: vec![0; lidars.len()],
+            terrain: Terrain {
+                ground: Ground::new(plan.ground, plan.seed),
+                wall: plan.wall,
+                boxes: plan.boxes.clone(),
+            },
+            lidars,
+            blade,
+            motion,
+            body,
+            plan,
+            done_ns: 0,
+            pending: Vec::new(),
+        })
+    }
+
+    /// Scene time from start to end, ns.
+    pub fn duration_ns(&self) -> i64 {
+        (self.plan.schedule.duration_s() * 1e9) as i64
+    }
+
+    /// Scene time that is simulated, ns.
+    pub fn done_ns(&self) -> i64 {
+        self.done_ns
+    }
+
+    /// Packets sent and lost by each sensor over the whole test.
+    pub fn packets(&self) -> Vec<(u32, u32)> {
+        let count = |fates: &Vec<Fate>| {
+            let lost = fates.iter().filter(|fate| fate.lost).count();
+            (fates.len() as u32, lost as u32)
+        };
+        self.fates.iter().map(count).collect()
+    }
+
+    /// Truth of the sections at scene times.
+    pub fn truth(&self, sections_m: &[f64], times_s: &[f64]) -> Vec<Vec<SectionTruth>> {
+        truth::sections(&self.blade, &self.motion, sections_m, times_s)
+    }
+
+    /// Share of full load at a scene time.
+    pub fn share(&self, time_s: f64) -> f64 {
+        self.motion.share(time_s)
+    }
+
+    /// Simulates a quarter of a second and writes what has arrived; false when all is written.
+    ///
+    /// # Errors
+    /// Those of the writer.
+    pub fn advance<W: Write>(&mut self, writer: &mut PcapWriter<W>) -> io::Result<bool> {
+        let from_ns = self.done_ns;
+        let to_ns = (from_ns + WINDOW_NS).min(self.duration_ns());
+        let mut arrivals = std::mem::take(&mut self.pending);
+        arrivals.extend(self.window(from_ns, to_ns));
+        let start = self.plan.start;
+        let network = &self.plan.network;
+        arrivals.extend(network.other(&self.lidars, start, from_ns, to_ns));
+        arrivals.sort_by_key(|arrival| (arrival.time, arrival.order));
+        let ended = to_ns == self.duration_ns();
+        // Later windows send nothing that arrives before their start.
+        let ripe = arrivals.partition_point(|arrival| ended || arrival.time < start + to_ns);
+        self.pending = arrivals.split_off(ripe);
+        for arrival in &arrivals {
+            writer.write_udp(
+                arrival.time,
+                arrival.source,
+                arrival.destination,
+                &arrival.payload,
+            )?;
+        }
+        self.done_ns = to_ns;
+        Ok(!ended)
+    }
+
+    /// Packets whose last shot falls into a window, as they arrive.
+    fn window(&mut self, from_ns: i64, to_ns: i64) -> Vec<Arrival> {
+        let states = self.states(from_ns - PACKET_NS, to_ns);
+        let mut tasks = Vec::new();
+        for (index, lidar) in self.lidars.iter().enumerate() {
+            let sight = Sight::new(lidar, &self.body, &states.nodes, self.plan.optics.beam_rad);
+            let last = self.fates[index].len() as u32;
+            let first = self.sent[index];
+            let ends = |k: &u32| lidar.scene_ns(*k, PACKET_NS) <= to_ns as f64;
+            let next = (first..last).find(|k| !ends(k)).unwrap_or(last);
+            tasks.extend((first..next).map(|packet| (index, packet, sight)));
+            self.sent[index] = next;
+        }
+        let arrivals: Vec<Vec<Arrival>> = tasks
+            .par_iter()
+            .map(|(index, packet, sight)| self.send(*index, *packet, sight, &states))
+            .collect();
+        arrivals.into_iter().flatten().collect()
+    }
+
+    fn states(&self, from_ns: i64, to_ns: i64) -> States {
+        let first = from_ns.div_euclid(STATE_NS);
+        let last = to_ns.div_euclid(STATE_NS) + 1;
+        let node = |state: i64| self.motion.nodes((state * STATE_NS) as f64 * 1e-9);
+        States {
+            first,
+            nodes: (first..=last).into_par_iter().map(node).collect(),
+        }
+    }
+
+    fn send(&self, index: usize, packet: u32, sight: &Sight, states: &States) -> Vec<Arrival> {
+        let fate = self.fates[index][packet as usize];
+        if fate.lost {
+            return Vec::new();
+        }
+        let lidar = &self.lidars[index];
+        let sent_ns = lidar.scene_ns(packet, PACKET_NS) as i64;
+        let arrival = Arrival {
+            time: self.plan.start + sent_ns + fate.delay_ns,
+            order: 64 + (u64::from(packet) << 8) + index as u64,
+            source: lidar.source(),
+            destination: lidar.destination(lidar.plan.port),
+            payload: self.payload(index, packet, sight, states).to_vec(),
+        };
+        if fate.doubled {
+            let again = Arrival {
+                time: arrival.time + 9_000,
+                ..arrival.clone()
+            };
+            return vec![arrival, again];
+        }
+        vec![arrival]
+    }
+
+    fn payload(
+        &self,
+        index: usize,
+        packet: u32,
+        sight: &Sight,
+        states: &States,
+    ) -> [u8; crate::packet::velodyne::LEN] {
+        let lidar = &self.lidars[index];
+        let part = [index as u64, u64::from(packet)];
+        let mut stream = Stream::new(self.plan.seed, Subject::Packet, part);
+        let mut blocks = [RawBlock::default(); BLOCKS];
+        for (number, block) in blocks.iter_mut().enumerate() {
+            let block_ns = number as i64 * puck::BLOCK_NS;
+            let azimuth = lidar.azimuth_rad(lidar.scene_ns(packet, block_ns));
+            block.azimuth_centideg = (azimuth.to_degrees() * 100.0).round() as u16 % 36_000;
+            for channel in 0..CHANNELS {
+                let laser = channel % puck::LASERS;
+                let firing_ns = (channel / puck::LASERS) as i64 * puck::FIRING_NS;
+                let after_ns = block_ns + firing_ns + laser as i64 * puck::LASER_NS;
+                let scene_ns = lidar.scene_ns(packet, after_ns);
+                let azimuth = lidar.azimuth_rad(scene_ns);
+                let view = View {
+                    terrain: &self.terrain,
+                    body: &self.body,
+                    pose: states.at(scene_ns),
+                    nodes: sight.nodes(azimuth),
+                };
+                let ray = lidar.ray(laser, azimuth);
+                let offset_m = lidar.range_offset_m[laser];
+                block.returns[channel] = self.plan.optics.shoot(&view, &ray, offset_m, &mut stream);
+            }
+        }
+        let stamp_us = lidar.stamp_us(packet);
+        encode(
+            &blocks,
+            stamp_us,
+            ReturnMode::Strongest,
+            puck::PRODUCT_VLP16,
+        )
+    }
+}
+
+/// The blade at even steps of scene time.
+#[derive(Debug)]
+struct States {
+    first: i64,
+    nodes: Vec<Vec<Node>>,
+}
+
+impl States {
+    fn at(&self, scene_ns: f64) -> Pose<'_> {
+        let place = scene_ns / STATE_NS as f64 - self.first as f64;
+        let before = (place.max(0.0) as usize).min(self.nodes.len() - 2);
+        Pose {
+            before: &self.nodes[before],
+            after: &self.nodes[before + 1],
+            share: place - before as f64,
+        }
+    }
+}
+
+impl ScenePlan {
+    fn pulls(&self, blade: &Blade, arc_m: &[f64]) -> Result<Vec<Pull>, InvalidValue> {
+        let pull = |saddle: &SaddlePlan| {
+            let node = arc_m.iter().position(|s| (s - saddle.s_m).abs() < 1e-6);
+            let node = node.filter(|node| *node > 0).ok_or_else(|| InvalidValue {
+                name: "saddles.s_m",
+                expected: format!("above 0 and up to {} m", blade.built.length_m()),
+                found: saddle.s_m.to_string(),
+            })?;
+            let (chord, normal) = blade.directions(saddle.s_m);
+            Ok(Pull {
+                node,
+                force_n: self.direction.normalize() * saddle.force_n,
+                lever_m: chord * saddle.lever_m[0] + normal * saddle.lever_m[1],
+                follower: self.follower,
+            })
+        };
+        self.saddles.iter().map(pull).collect()
+    }
+
+    /// What is seen of the saddles: frames a hand wider than the section.
+    fn frames(&self, blade: &Blade, pulls: &[Pull]) -> Vec<Saddle> {
+        let frame = |(saddle, pull): (&SaddlePlan, &Pull)| {
+            let skin = blade.skin(saddle.s_m);
+            let (chord, normal) = blade.directions(saddle.s_m);
+            let extent = |axis: &Vector3<f64>| {
+                let places = skin.iter().map(|p| axis.x * p.x + axis.y * p.y);
+                places.fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p), b.max(p)))
+            };
+            let [(a, b), (c, d)] = [extent(&chord), extent(&normal)];
+            Saddle {
+                node: pull.node,
+                middle_m: chord * (0.5 * (a + b)) + normal * (0.5 * (c + d)),
+                half_m: Vector3::new(0.5 * (b - a) + 0.15, 0.5 * (d - c) + 0.15, 0.25),
+                chord,
+                anchor_m: saddle.anchor_m,
+                cable_radius_m: self.cable_radius_m,
+            }
+        };
+        let shown = if self.show_saddles { pulls.len() } else { 0 };
+        self.saddles
+            .iter()
+            .zip(pulls)
+            .take(shown)
+            .map(frame)
+            .collect()
+    }
+}
+
+/// The rotation whose columns are where the sensor's axes point.
+///
+/// # Errors
+/// [`InvalidValue`] where the three are not a right-handed set of perpendicular directions.
+pub fn axes(columns: [Vector3<f64>; 3]) -> Result<Rotation3<f64>, InvalidValue> {
+    let [x, y, z] = columns;
+    let right = x.cross(&y).dot(&z);
+    if (right - 1.0).abs() < 1e-6 && [x, y, z].iter().all(|a| (a.norm() - 1.0).abs() < 1e-6) {
+        return Ok(Rotation3::from_basis_unchecked(&[x, y, z]));
+    }
+    Err(InvalidValue {
+        name: "lidars.axes",
+        expected: "x, y and z perpendicular, of length one and right-handed".into(),
+        found: format!("x cross y along z is {right:.3}"),
+    })
+}
