@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CaptureScan",
+    "PointIterator",
     "Sweep",
     "SweepIterator",
     "__version__",
     "check_captures",
+    "cut_capture",
     "scan_capture",
     "sensor_models",
 ]
@@ -20,6 +22,15 @@ __all__ = [
 __version__: str
 
 def check_captures(paths: Sequence[Path]) -> None: ...
+def cut_capture(
+    scan: CaptureScan,
+    out: Path,
+    *,
+    lidars: Sequence[int],
+    start_ns: int | None = None,
+    stop_ns: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> int: ...
 def scan_capture(
     paths: Sequence[Path],
     *,
@@ -38,6 +49,25 @@ class CaptureScan:
     def last_time_ns(self) -> int | None: ...
     def describe(self) -> dict[str, Any]: ...
     def health(self) -> dict[str, Any]: ...
+
+@final
+class PointIterator(Iterator[dict[str, NDArray[Any]]]):
+    def __new__(
+        cls,
+        scan: CaptureScan,
+        *,
+        lidars: Sequence[int],
+        block_points: int,
+        start_ns: int | None = None,
+        stop_ns: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> PointIterator: ...
+    def __iter__(self) -> PointIterator: ...
+    def __next__(self) -> dict[str, NDArray[Any]]: ...
+    @property
+    def merged(self) -> int: ...
+    @property
+    def drops(self) -> list[tuple[str, int]]: ...
 
 @final
 class Sweep:
