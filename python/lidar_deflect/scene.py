@@ -85,7 +85,7 @@ class Ground(Model):
     height_m: Number = Field(-7.2, description="at x = z = 0")
     slope_x: Number = 0.018
     slope_z: Number = -0.012
-    roughness_mm: NotNegative = Field(15.0, description="sigma of the heights")
+    roughness_mm: NotNegative = Field(8.0, description="sigma of the heights")
     correlation_m: Positive = Field(0.8, description="distance over which heights are alike")
 
 
@@ -141,7 +141,7 @@ class Sensors(Model):
 
     tilt_deg: NotNegative = Field(2.5, description="sigma of the tilt about each axis")
     beam_mrad: Positive = Field(1.0, description="full angle of a beam")
-    noise_mm: NotNegative = Field(8.0, description="sigma of one range")
+    noise_mm: NotNegative = Field(10.0, description="sigma of one range")
     channel_offset_mm: NotNegative = Field(6.0, description="sigma of the offset of each laser")
     unit_offset_mm: NotNegative = Field(5.0, description="sigma of the offset of each unit")
     incidence_bias_mm: Number = Field(0.0, description="error times (1 / cos(incidence) - 1)")
@@ -272,7 +272,7 @@ def _lidars(x_m: float, ground: Ground, first_z_m: float, step_m: float) -> list
             "address": f"192.168.1.{201 + i}",
             "position_m": (
                 x_m,
-                round(ground.height_m + ground.slope_x * x_m + ground.slope_z * z + 1.4, 3),
+                round(ground.height_m + ground.slope_x * x_m + ground.slope_z * z + 1.2, 3),
                 z,
             ),
         }
@@ -299,7 +299,7 @@ def demo(seed: int = 1) -> Scene:
         {
             "id": "demo-edge",
             "seed": seed,
-            "saddles": _saddles(1000.0, (0.05, 0.02)),
+            "saddles": _saddles(1000.0, (0.02, 0.01)),
             "sways": _sways(8.0, 6.0),
             "wall": {},
             "boxes": _boxes(),
@@ -317,7 +317,7 @@ def flapwise(seed: int = 1) -> Scene:
             "seed": seed,
             "blade": {"leading_edge": "+y", "suction_side": "+x"},
             "loading": {"levels_percent": (0.0, 100.0), "hold_s": 4.0, "ramp_s": 12.0},
-            "saddles": _saddles(2500.0, (0.05, 0.02)),
+            "saddles": _saddles(2500.0, (0.02, 0.01)),
             "sways": _sways(12.0, 5.0),
             "ground": ground.model_dump(),
             "wall": {},
