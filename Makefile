@@ -1,10 +1,10 @@
 # Every target is one visible command. PYTHON=python3.12 make demo picks another interpreter.
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 RUST := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: demo test test-rust test-python lint format bench wheel docs lock clean help
+.PHONY: demo test test-rust test-python lint format bench wheel lock clean help cargo
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -38,6 +38,7 @@ bench: cargo ## throughput, see benches/README.md
 	cargo bench
 
 wheel: $(VENV)/ready cargo ## one stable-ABI wheel in dist/
+	$(BIN)/python tools/third_party.py
 	$(BIN)/maturin build --release --locked --out dist
 
 lock: $(VENV)/ready ## renew the pinned Python requirements
@@ -47,20 +48,20 @@ lock: $(VENV)/ready ## renew the pinned Python requirements
 	  pyproject.toml $$(cat requirements/$$set.groups) --output-file requirements/$$set.txt || exit 1; done
 
 clean: ## remove what was built
-	rm -rf target $(VENV) dist lidar-deflect-demo
+	rm -rf target $(VENV) dist lidar-deflect-demo LICENSE-THIRD-PARTY
 
-.PHONY: cargo
+# What has to be there before anything is downloaded.
 cargo:
 	@command -v cargo >/dev/null || { echo 'cargo is missing: install Rust from https://rustup.rs, then open a new shell' >&2; exit 1; }
 
 # An environment that can build and run, then the extension in it, then what the tests need.
-$(VENV)/ready: requirements/run.txt
+$(VENV)/ready: requirements/run.txt | cargo
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo 'Python 3.11 or newer is needed: make PYTHON=python3.12' >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements/run.txt
 	@touch $@
 
-$(VENV)/built: $(VENV)/ready $(RUST) pyproject.toml | cargo
+$(VENV)/built: $(VENV)/ready $(RUST) pyproject.toml
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
 	@touch $@
 

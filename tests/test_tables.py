@@ -122,11 +122,13 @@ def test_a_frame_of_another_shape_is_not_written(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_that_is_not_there_leaves_a_named_error(tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_leaves_a_named_error_and_no_file(tmp_path: Path) -> None:
     frame = tables.build("channels", channel_columns())
+    (tmp_path / "file").write_text("no folder")
     with pytest.raises(OutputError) as caught:
-        tables.write(frame, tmp_path / "none" / "channels.parquet", METADATA)
+        tables.write(frame, tmp_path / "file" / "channels.parquet", METADATA)
     assert caught.value.exit_code == 7
+    assert [each.name for each in tmp_path.iterdir()] == ["file"]
 
 
 def test_only_tables_of_this_schema_are_read(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ _HOME = {
 }
 """Which module each public name lives in; it is imported when the name is first used."""
 
-__all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604  # all are strings
+__all__ = ["__version__", *sorted(_HOME)]  # all are strings
 
 
 def __getattr__(name: str) -> Any:

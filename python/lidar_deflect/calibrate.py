@@ -75,7 +75,7 @@ def _surveyed_wall(config: Config) -> Wall | None:
 
 
 def _slope_warning(config: Config) -> tuple[str, ...]:
-    """Say how far the surveyed ground is from level: the method takes its normal for the vertical."""
+    """Say how far the surveyed ground is from level, which the method takes it for."""
     ground = [point.xyz_m for point in config.control if point.on == "ground"]
     if len(ground) < 3:
         return ()

@@ -56,22 +56,21 @@ def check(config: Config, capture: Capture) -> tuple[Finding, ...]:
 
 
 def _lidars(config: Config, capture: Capture) -> Iterator[Finding]:
-    present = set(capture.lidars)
-    ids = {lidar.id for lidar in config.lidars}
     for lidar in config.lidars:
-        if lidar.id not in present:
+        if lidar.id in capture.missing:
             yield Finding(
                 "check.silent_lidar",
                 f"lidar {lidar.id} ({lidar.source}) never sends",
                 "see who does: lidar-deflect info CAPTURE",
                 INPUT,
             )
-    for other in sorted(present - ids):
-        yield Finding(
-            "check.unknown_lidar",
-            f"{other} sends lidar packets and is not in the configuration",
-            "add it to [[lidars]] if it belongs to the test",
-        )
+    for stream in capture.streams:
+        if stream.lidar not in capture.lidars:
+            yield Finding(
+                "check.unknown_lidar",
+                f"{stream.address} sends lidar packets and is not in the configuration",
+                "add it to [[lidars]] if it belongs to the test",
+            )
 
 
 def _poses(config: Config) -> Iterator[Finding]:

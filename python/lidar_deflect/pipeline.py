@@ -197,16 +197,14 @@ class Setup:
         """Open captures, see which lidars are in them, and read the load channel."""
         files = tuple(Path(path) for path in paths)
         capture = captures.open(files, config=config)
-        capture.scan(progress=_stage(progress, "scan"), threads=threads)
-        ids = tuple(lidar.id for lidar in config.lidars)
-        present = tuple(id for id in ids if id in capture.lidars)
-        if not present:
+        capture.scan(_stage(progress, "scan"))
+        if not capture.lidars:
             raise CaptureError(
                 "none of the configured lidars is in the capture",
                 code="capture.no_configured_lidar",
                 facts=[
                     ("configured", ", ".join(f"{x.id} = {x.source}" for x in config.lidars)),
-                    ("captured", ", ".join(stream.name for stream in capture.streams)),
+                    ("captured", ", ".join(stream.address for stream in capture.streams)),
                 ],
                 hint="correct source of [[lidars]]",
             )
@@ -215,8 +213,8 @@ class Setup:
             config,
             files,
             capture,
-            present,
-            tuple(id for id in ids if id not in present),
+            capture.lidars,
+            capture.missing,
             load,
             None if load is None else hold_finder.from_load(load.time_ns, load.value),
             progress,

@@ -6,8 +6,9 @@
 
 from lidar_deflect.comparison.compare import ComparisonWarning, compare, save
 from lidar_deflect.comparison.error import error_percent
+from lidar_deflect.comparison.methods import by_method, largest_step
 from lidar_deflect.comparison.reference import KINDS, Kind, Reference, recognise
-from lidar_deflect.comparison.text import aligned, largest_step, table1, table2
+from lidar_deflect.comparison.text import aligned, table1, table2
 
 __all__ = [
     "KINDS",
@@ -15,6 +16,7 @@ __all__ = [
     "Kind",
     "Reference",
     "aligned",
+    "by_method",
     "compare",
     "error_percent",
     "largest_step",

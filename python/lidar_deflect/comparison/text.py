@@ -4,13 +4,10 @@ from collections.abc import Sequence
 
 import polars as pl
 
-from lidar_deflect.comparison.error import error_percent
+from lidar_deflect.comparison.methods import LIDAR, by_method, largest_step
 
 NONE = "-"
 """Stands where there is no value."""
-
-_TRUSTED = ("prediction", "truth")
-"""Sources that can stand for T of equation (16) against other instruments."""
 
 
 def table1(steps: pl.DataFrame, *, step: str | None = None) -> str:
@@ -64,55 +61,27 @@ def table2(frame: pl.DataFrame, *, step: str | None = None) -> str:
     step = step or largest_step(frame)
     rows = frame.filter(pl.col("step") == step).sort("s_m", "source", maintain_order=True)
     parts = [f"at {step or 'no step'}; error = (M - T) / T"]
-    trusted = next((s for s in _TRUSTED if _totals(rows, s).height), None)
-    if trusted is not None:
-        parts.append(_like_the_paper(rows, trusted))
+    methods = by_method(frame, step=step)
+    if methods.height:
+        parts.append(_like_the_paper(methods))
     parts.append(_every_row(rows))
     return "\n\n".join(parts)
 
 
-def largest_step(frame: pl.DataFrame) -> str | None:
-    """Return the step with the largest total deflection, the first of equals."""
-    name = "d_m" if "d_m" in frame.columns else "measured_m"
-    known = frame.filter(pl.col(name).is_not_null())
-    if known.is_empty():
-        return None
-    found: str = known.sort(pl.col(name).abs(), descending=True, maintain_order=True)["step"][0]
-    return found
-
-
-def _totals(rows: pl.DataFrame, source: str) -> pl.DataFrame:
-    return rows.filter(pl.col("source") == source, pl.col("quantity") == "total")
-
-
-def _like_the_paper(rows: pl.DataFrame, trusted: str) -> str:
-    head = ["s (m)", "wire (mm)", f"{trusted} (mm)", "lidar (mm)", "error of wire", "of lidar"]
+def _like_the_paper(methods: pl.DataFrame) -> str:
+    """One line per section: each method's value, then the errors against T."""
+    names = methods["method"].unique(maintain_order=True).to_list()
+    trusted = methods["against"][0]
+    order = [*(name for name in names if name != LIDAR), trusted, LIDAR]
+    head = ["s (m)", *(f"{name} (mm)" for name in order), *(f"{name} error" for name in names)]
     body = []
-    for row in _totals(rows, trusted).iter_rows(named=True):
-        wire, true, own = _wire(rows, row["section"]), row["reference_m"], row["measured_m"]
-        errors = [_percent_of(wire, true), _percent_of(own, true)]
-        body.append([f"{row['s_m']:g}", *(_millimetres(v) for v in (wire, true, own)), *errors])
+    for (s_m,), rows in methods.group_by("s_m", maintain_order=True):
+        found = {row["method"]: row for row in rows.iter_rows(named=True)}
+        values = {name: row["value_m"] for name, row in found.items()}
+        values[trusted] = rows["reference_m"][0]
+        errors = [_percent(found[n]["error_percent"]) if n in found else NONE for n in names]
+        body.append([f"{s_m:g}", *(_millimetres(values.get(n)) for n in order), *errors])
     return aligned(head, body)
-
-
-def _wire(rows: pl.DataFrame, section: str) -> float | None:
-    """Return the reading of the first draw wire at a section."""
-    readings = rows.filter(
-        pl.col("section") == section,
-        pl.col("quantity") == "total",
-        pl.col("source").is_in(_wire_names(rows)),
-    )["reference_m"]
-    return None if readings.is_empty() else float(readings[0])
-
-
-def _wire_names(rows: pl.DataFrame) -> list[str]:
-    """Name the draw wires: unlike runs they have no components."""
-    kinds = rows.group_by("source").agg(pl.col("quantity").unique())
-    return [
-        source
-        for source, quantities in kinds.iter_rows()
-        if source not in _TRUSTED and set(quantities) <= {"wire", "total"}
-    ]
 
 
 def _every_row(rows: pl.DataFrame) -> str:
@@ -125,7 +94,7 @@ def _every_row(rows: pl.DataFrame) -> str:
             _millimetres(row["measured_m"]),
             _millimetres(row["reference_m"]),
             _millimetres(_difference(row["measured_m"], row["reference_m"])),
-            NONE if row["error_percent"] is None else f"{row['error_percent']:.2f} %",
+            _percent(row["error_percent"]),
         ]
         for row in rows.iter_rows(named=True)
     ]
@@ -136,18 +105,16 @@ def _difference(own: float | None, true: float | None) -> float | None:
     return None if own is None or true is None else own - true
 
 
-def _percent_of(own: float | None, true: float | None) -> str:
-    if own is None or not true:
-        return NONE
-    return f"{float(error_percent(own, true)):.2f} %"
+def _percent(value: float | None) -> str:
+    return NONE if value is None else f"{value:z.2f} %"
 
 
 def _metres(value: float | None) -> str:
-    return NONE if value is None else f"{value:.3f}"
+    return NONE if value is None else f"{value:z.3f}"
 
 
 def _millimetres(value: float | None) -> str:
-    return NONE if value is None else f"{1e3 * value:.0f}"
+    return NONE if value is None else f"{1e3 * value:z.0f}"
 
 
 def aligned(head: Sequence[str], body: Sequence[Sequence[str]], *, left: int = 1) -> str:

@@ -69,7 +69,7 @@ class Paper(Model):
         default="auto", description="step 10: xoz | yoz | auto (the two axes that deform most)"
     )
     tip_max_u_m: Positive = Field(
-        5.0,
+        default=5.0,
         description="step 10: a tip less certain than this along the span is ill-posed, by the "
         "scatter of the contour samples alone",
     )

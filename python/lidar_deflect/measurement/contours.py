@@ -38,9 +38,9 @@ def distances_of(inputs: Inputs, plan: Plan) -> Floats:
     numpy.ndarray
         Shape (lidars, 2), metres, over the whole test; NaN for a lidar that saw no blade.
     """
-    run = _native.DistancePass(*_frames(inputs, plan))
-    while run.advance(BLOCK_FRAMES, inputs.threads):
-        inputs.tell("survey", *run.progress)
+    run = _native.DistancePass(_frame_plan(inputs, plan))
+    while run.advance(BLOCK_FRAMES, inputs.threads, inputs.listener("survey")):
+        pass
     return run.ranges_m()
 
 
@@ -53,13 +53,13 @@ def contours_of(inputs: Inputs, plan: Plan, distances_m: Floats) -> ContourRun:
         If no frame shows the blade at all.
     """
     run = _native.ContourPass(
-        *_frames(inputs, plan),
+        _frame_plan(inputs, plan),
         _native.FrameParams(**_parameters(inputs, plan, distances_m)),
         sample_every=max(1, round(SAMPLE_S * inputs.rate_hz)),
         sample_points=SAMPLE_POINTS,
     )
-    while run.advance(BLOCK_FRAMES, inputs.threads):
-        inputs.tell("measure", *run.progress)
+    while run.advance(BLOCK_FRAMES, inputs.threads, inputs.listener("measure")):
+        pass
     contours = ContourRun(run)
     if not contours.uses.used.any():
         raise MeasurementError(
@@ -71,26 +71,28 @@ def contours_of(inputs: Inputs, plan: Plan, distances_m: Floats) -> ContourRun:
     return contours
 
 
-def _frames(inputs: Inputs, plan: Plan) -> tuple[Any, ...]:
+def _frame_plan(inputs: Inputs, plan: Plan) -> _native.FramePlan:
     """Return what both passes need to make frames out of a capture."""
-    poses = [inputs.calibration.pose(lidar).world_from_sensor for lidar in inputs.lidars]
-    cuts = [plan.cut_azimuth_deg[lidar] for lidar in inputs.lidars]
     period_ns = round(1e9 / inputs.rate_hz)
-    first_ns = inputs.capture.first_time_ns
     # The first state is the first multiple of the period after the first packet.
-    skipped = max(1, -(-(inputs.start_ns - first_ns) // period_ns))
-    start_ns = first_ns - first_ns % period_ns + skipped * period_ns
-    source = inputs.capture.native_sweeps(
-        inputs.lidars, start_ns=inputs.start_ns, stop_ns=inputs.stop_ns, cut_azimuth_deg=cuts
+    first_ns = (inputs.start_ns // period_ns + 1) * period_ns
+    return _native.FramePlan(
+        inputs.capture.native,
+        lidars=inputs.capture.numbers(inputs.lidars),
+        poses=np.array([inputs.calibration.pose(x).world_from_sensor for x in inputs.lidars]),
+        cut_azimuth_deg=[plan.cut_azimuth_deg[lidar] for lidar in inputs.lidars],
+        box_m=np.ascontiguousarray(plan.box_m),
+        first_ns=first_ns,
+        period_ns=period_ns,
+        start_ns=inputs.start_ns,
+        stop_ns=inputs.stop_ns,
     )
-    return source, np.array(poses), plan.box_m, start_ns, period_ns
 
 
 def _parameters(inputs: Inputs, plan: Plan, distances_m: Floats) -> Mapping[str, Any]:
     """Everything of ``[paper]`` that steps 6 to 10 use."""
     given = inputs.config.paper
     return {
-        "sensors_m": np.array([inputs.calibration.pose(x).position_m for x in inputs.lidars]),
         "distances_m": None if given.continuous else distances_m,
         "intervals": given.intervals,
         "alpha_deg": plan.alpha_deg,

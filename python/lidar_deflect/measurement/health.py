@@ -22,26 +22,21 @@ SECOND_NS = 1_000_000_000
 def health_table(capture: Capture, lidars: Sequence[str], states: States) -> pl.DataFrame:
     """Table `health` of the measured lidars, with the points that counted as blade."""
     counted = capture.health()
-    ours = np.isin(counted["lidar"], list(lidars))
-    columns: dict[str, Any] = {name: values[ours] for name, values in counted.items()}
-    start_ns = columns.pop("time_ns")
-    return tables.build(
-        "health",
-        columns
-        | {
-            "time": start_ns,
-            "t_s": (start_ns - capture.first_time_ns) * 1e-9,
-            "lidar": list(columns["lidar"]),
-            "blade_points": _blade_points(start_ns, columns["lidar"], lidars, states),
-        },
-    )
+    names = tables.SCHEMAS["health"].names
+    columns: dict[str, Any] = {name: counted[name] for name in names if name in counted}
+    columns |= {
+        "time": counted["time_ns"],
+        "t_s": (counted["time_ns"] - capture.first_time_ns) * 1e-9,
+        "lidar": counted["lidar"].tolist(),
+        "blade_points": [
+            _blade_points(int(start_ns), lidars.index(lidar), states)
+            for start_ns, lidar in zip(counted["time_ns"], counted["lidar"], strict=True)
+        ],
+    }
+    return tables.build("health", columns)
 
 
-def _blade_points(start_ns: Any, of_lidar: Any, lidars: Sequence[str], states: States) -> list[int]:
-    """Points used in the frames of each second, by lidar."""
-    second = np.searchsorted(np.unique(start_ns), states.time_ns, side="right") - 1
-    row_second = np.searchsorted(np.unique(start_ns), start_ns)
-    sums = np.zeros((second.max(initial=0) + 1 + len(start_ns), len(lidars)), dtype=np.int64)
-    np.add.at(sums, np.clip(second, 0, None), states.blade_points)
-    column = {id: index for index, id in enumerate(lidars)}
-    return [int(sums[s, column[id]]) for s, id in zip(row_second, of_lidar, strict=True)]
+def _blade_points(start_ns: int, lidar: int, states: States) -> int:
+    """Points used in the frames of one second."""
+    from_, to = np.searchsorted(states.time_ns, [start_ns, start_ns + SECOND_NS])
+    return int(states.blade_points[from_:to, lidar].sum())

@@ -48,7 +48,7 @@ class Inputs:
     progress: Progress | None = None
     threads: int | None = None
 
-    def tell(self, stage: str, done: int, total: int) -> None:
-        """Pass progress on, where somebody listens."""
-        if self.progress is not None:
-            self.progress(stage, done, total)
+    def listener(self, stage: str) -> Callable[[int, int], None] | None:
+        """Return who is told the progress of one stage, or None where nobody listens."""
+        progress = self.progress
+        return None if progress is None else lambda done, total: progress(stage, done, total)

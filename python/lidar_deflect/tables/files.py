@@ -1,13 +1,13 @@
 """Tables on disk: parquet with schema version, program version and configuration hash."""
 
-import os
 from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 
 import polars as pl
 
-from lidar_deflect.errors import InvalidValueError, OutputError, ResultError, ResultNotFoundError
+from lidar_deflect.errors import InvalidValueError, ResultError, ResultNotFoundError
+from lidar_deflect.files import whole_file
 from lidar_deflect.tables.build import check
 from lidar_deflect.tables.catalogue import SCHEMA_VERSION, SCHEMAS
 
@@ -55,24 +55,12 @@ def write(
     if HASH_KEY not in metadata:
         raise InvalidValueError(f"metadata of table {name} lacks {HASH_KEY}", code="table.metadata")
     own = dict(zip(_OWN, (str(SCHEMA_VERSION), version("lidar-deflect"), name), strict=True))
-    _write_then_rename(frame, path, {**metadata, **own})
+    with whole_file(path, overwrite=True) as temporary:
+        try:
+            frame.write_parquet(temporary, metadata={**metadata, **own})
+        except pl.exceptions.PolarsError as error:
+            raise OSError(str(error).splitlines()[0]) from error
     return path
-
-
-def _write_then_rename(frame: pl.DataFrame, path: Path, metadata: dict[str, str]) -> None:
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        frame.write_parquet(part, metadata=metadata)
-        part.replace(path)
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise OutputError(
-            f"cannot write {path}",
-            code="output.table",
-            facts=[("because", str(error).splitlines()[0])],
-            hint="is there space, and may you write here?",
-        ) from error
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def read(path: str | Path, *, name: str | None = None) -> pl.DataFrame:

@@ -149,6 +149,17 @@ impl<F> PointCloud<F> {
         self.block.clear();
     }
 
+    /// Azimuths in degrees, [0, 360).
+    pub fn azimuth_deg(&self) -> Vec<f32> {
+        let degrees = |azimuth_rad: &f32| f64::from(*azimuth_rad).to_degrees() as f32;
+        self.azimuth_rad.iter().map(degrees).collect()
+    }
+
+    /// Meanings of the returns as numbers: the place of each in the declaration of [`ReturnKind`].
+    pub fn return_kind_codes(&self) -> Vec<u8> {
+        self.return_kind.iter().map(|kind| *kind as u8).collect()
+    }
+
     /// Makes room for `additional` more echoes.
     pub fn reserve(&mut self, additional: usize) {
         self.xyz_m.reserve(additional);

@@ -28,6 +28,17 @@ pub struct Sweep {
     pub packets: u32,
     /// Packets of it that were lost.
     pub lost: u32,
+    /// Stretches of time from which packets are lost.
+    pub gaps: Vec<Gap>,
+}
+
+/// A stretch of time from which packets are lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Gap {
+    /// When the first lost packet began.
+    pub from: Timestamp,
+    /// When the next packet that arrived began.
+    pub to: Timestamp,
 }
 
 /// One packet in its place, for the cutter.
@@ -80,6 +91,7 @@ struct Open {
     seen_rad: f64,
     packets: u32,
     lost: u32,
+    gaps: Vec<Gap>,
 }
 
 impl SweepCutter {
@@ -116,14 +128,20 @@ impl SweepCutter {
     pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep>) {
         let start_rad = self.place(packet);
         let end_rad = start_rad + packet.head.turned_rad.max(0.0);
-        self.add_lost(packet, start_rad);
+        let lost_behind_cut = self.add_lost(packet, start_rad);
         let first_turn = turn_of(start_rad);
+        let gap = self.end.filter(|_| packet.lost > 0);
+        let gap = gap.map(|end| Gap { from: end.time, to: packet.time });
         if self.open.as_ref().is_none_or(|open| open.turn < first_turn) {
+            // A gap over the cut belongs to the sweeps on both sides.
+            self.add_gap(gap);
             self.close(self.end.map_or(packet.time, |end| end.time), out);
             self.open(first_turn, packet.time);
         }
+        self.add_gap(gap);
         if let Some(open) = &mut self.open {
             open.packets += 1;
+            open.lost = open.lost.saturating_add(lost_behind_cut);
         }
         self.fill(packet, decoded, start_rad, end_rad, out);
         self.end = Some(End::of(packet, start_rad));
@@ -151,16 +169,29 @@ impl SweepCutter {
         expected_rad + wrap_half_turn(after_cut_rad - wrap_turn(expected_rad))
     }
 
-    /// Spreads missing packets over the sweeps on both sides of a cut.
-    fn add_lost(&mut self, packet: &Placed, start_rad: f64) {
+    /// Counts missing packets before the cut to the open sweep; gives those of the turn that the
+    /// packet begins in. Turns of which nothing arrived keep theirs.
+    fn add_lost(&mut self, packet: &Placed, start_rad: f64) -> u32 {
         let (Some(open), Some(end)) = (&mut self.open, self.end) else {
-            return;
+            return 0;
         };
         let gap_rad = (start_rad - end.turned_rad).max(1e-9);
-        let to_cut_rad = f64::from(open.turn + 1) * TAU - end.turned_rad;
-        let share = (to_cut_rad / gap_rad).clamp(0.0, 1.0);
-        let here = (packet.lost as f64 * share).round() as u32;
+        let until = |turn: u32| {
+            let share = (f64::from(turn) * TAU - end.turned_rad) / gap_rad;
+            (packet.lost as f64 * share.clamp(0.0, 1.0)).round() as u32
+        };
+        let here = until(open.turn.saturating_add(1));
         open.lost = open.lost.saturating_add(here);
+        let whole = until(turn_of(start_rad)).max(here);
+        u32::try_from(packet.lost)
+            .unwrap_or(u32::MAX)
+            .saturating_sub(whole)
+    }
+
+    fn add_gap(&mut self, gap: Option<Gap>) {
+        if let Some(open) = &mut self.open {
+            open.gaps.extend(gap);
+        }
     }
 
     fn open(&mut self, turn: u32, start: Timestamp) {
@@ -172,6 +203,7 @@ impl SweepCutter {
             seen_rad: 0.0,
             packets: 0,
             lost: 0,
+            gaps: Vec::new(),
         });
     }
 
@@ -186,6 +218,7 @@ impl SweepCutter {
             coverage: (open.seen_rad / self.visible_rad).min(1.0) as f32,
             packets: open.packets,
             lost: open.lost,
+            gaps: open.gaps,
         });
     }
 
@@ -201,7 +234,7 @@ impl SweepCutter {
         let mut from = 0;
         let mut from_rad = start_rad;
         while let Some(open) = &mut self.open {
-            let cut_rad = f64::from(open.turn + 1) * TAU;
+            let cut_rad = (f64::from(open.turn) + 1.0) * TAU;
             if end_rad < cut_rad {
                 break;
             }

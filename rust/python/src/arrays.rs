@@ -1,7 +1,12 @@
 //! Checks on arrays that come in; each message names the argument, what it is and what was expected.
 
-use nalgebra::{Unit, Vector3};
-use numpy::{PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use nalgebra::{Matrix4, Unit, Vector3};
+use numpy::ndarray::Dimension;
+use numpy::{
+    IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray, PyReadonlyArray1,
+    PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
 
 use crate::error::BorderResult;
 use lidar_deflect_core::error::InvalidValue;
@@ -11,18 +16,7 @@ pub fn points<'a, T: numpy::Element>(
     name: &'static str,
     array: &'a PyReadonlyArray2<'_, T>,
 ) -> BorderResult<&'a [[T; 3]]> {
-    let refuse = |found: String| InvalidValue {
-        name,
-        expected: "shape (n, 3) in C order".into(),
-        found,
-    };
-    if array.shape()[1] != 3 {
-        return Err(refuse(format!("shape {:?}", array.shape())).into());
-    }
-    let flat = array
-        .as_slice()
-        .map_err(|_| refuse("a strided view".into()))?;
-    Ok(flat.as_chunks().0)
+    Ok(flat(name, "shape (n, 3) in C order", array.shape()[1] == 3, array)?.as_chunks().0)
 }
 
 /// Borrows a contiguous array of `len` values, without a copy.
@@ -63,4 +57,81 @@ pub fn direction(
             }
             .into()
         })
+}
+
+/// Borrows a contiguous array of any length, without a copy.
+pub fn values<'a, T: numpy::Element>(
+    name: &'static str,
+    array: &'a PyReadonlyArray1<'_, T>,
+) -> BorderResult<&'a [T]> {
+    column(name, array, array.len())
+}
+
+/// Borrows an (n, 2) array in C order, without a copy.
+pub fn pairs<'a>(
+    name: &'static str,
+    array: &'a PyReadonlyArray2<'_, f64>,
+) -> BorderResult<&'a [[f64; 2]]> {
+    Ok(flat(name, "shape (n, 2) in C order", array.shape()[1] == 2, array)?.as_chunks().0)
+}
+
+/// Reads an array of `count` homogeneous matrices.
+pub fn matrices(
+    name: &'static str,
+    array: &PyReadonlyArray3<'_, f64>,
+    count: usize,
+) -> BorderResult<Vec<Matrix4<f64>>> {
+    let fits = array.shape() == [count, 4, 4];
+    let flat = flat(name, "one 4 x 4 matrix per lidar in C order", fits, array)?;
+    Ok(flat.chunks_exact(16).map(Matrix4::from_row_slice).collect())
+}
+
+/// Refuses another number of rows than expected.
+pub fn expect_rows(name: &'static str, found: usize, expected: usize) -> BorderResult<()> {
+    if found == expected {
+        return Ok(());
+    }
+    let (expected, found) = (format!("{expected} rows"), format!("{found} rows"));
+    Err(InvalidValue { name, expected, found }.into())
+}
+
+fn flat<'a, T: numpy::Element, D: Dimension>(
+    name: &'static str,
+    expected: &str,
+    fits: bool,
+    array: &'a PyReadonlyArray<'_, T, D>,
+) -> BorderResult<&'a [T]> {
+    let refuse = |found: String| InvalidValue { name, expected: expected.into(), found };
+    if !fits {
+        return Err(refuse(format!("shape {:?}", array.shape())).into());
+    }
+    Ok(array.as_slice().map_err(|_| refuse("a strided view".into()))?)
+}
+
+/// Hands over rows of a fixed number of columns, (n, N), without a copy.
+pub fn rows<'py, T: numpy::Element, const N: usize>(
+    py: Python<'py>,
+    rows: Vec<[T; N]>,
+) -> PyResult<Bound<'py, PyArray2<T>>> {
+    table(py, rows.into_flattened(), N)
+}
+
+/// Hands over values as (n, columns), without a copy.
+pub fn table<T: numpy::Element>(
+    py: Python<'_>,
+    values: Vec<T>,
+    columns: usize,
+) -> PyResult<Bound<'_, PyArray2<T>>> {
+    let rows = values.len() / columns.max(1);
+    values.into_pyarray(py).reshape([rows, columns])
+}
+
+/// Hands over points as (n, columns, 3), without a copy.
+pub fn tables<'py>(
+    py: Python<'py>,
+    points: Vec<[f64; 3]>,
+    columns: usize,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let rows = points.len() / columns.max(1);
+    points.into_flattened().into_pyarray(py).reshape([rows, columns, 3])
 }

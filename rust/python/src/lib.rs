@@ -6,9 +6,9 @@
 // The first binding functions use them.
 #[allow(dead_code)]
 mod arrays;
+mod capture;
 #[allow(dead_code)]
 mod compute;
-#[allow(dead_code)]
 mod error;
 mod synthetic;
 
@@ -17,6 +17,7 @@ use pyo3::prelude::*;
 /// The compiled part of `lidar_deflect`; private, its public face is the Python package.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    capture::register(module)?;
     synthetic::register(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -3,7 +3,7 @@
 use lidar_deflect_core::register::closed_form;
 use lidar_deflect_core::register::wall::{self, ExpectedWall};
 use nalgebra::{Rotation3, Vector3};
-use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2, ToPyArray};
+use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::arrays;
@@ -26,12 +26,12 @@ fn rotation_onto<'py>(
 ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
     let from = arrays::direction("from_direction", &from_direction)?;
     let to = arrays::direction("to_direction", &to_direction)?;
-    Ok(matrix(py, &closed_form::rotation_onto(&from, &to)))
+    Ok(matrix(py, &closed_form::rotation_onto(&from, &to))?)
 }
 
 /// Rotation (3, 3) about world up.
 #[pyfunction]
-fn rotation_about_up(py: Python<'_>, yaw_rad: f64) -> Bound<'_, PyArray2<f64>> {
+fn rotation_about_up(py: Python<'_>, yaw_rad: f64) -> PyResult<Bound<'_, PyArray2<f64>>> {
     matrix(py, &Rotation3::from_axis_angle(&Vector3::y_axis(), yaw_rad))
 }
 
@@ -53,7 +53,10 @@ fn yaw_from_wall<'py>(
     Ok((found.yaw_rad, found.plane.rms_m, found.plane.count))
 }
 
-fn matrix<'py>(py: Python<'py>, rotation: &Rotation3<f64>) -> Bound<'py, PyArray2<f64>> {
+fn matrix<'py>(
+    py: Python<'py>,
+    rotation: &Rotation3<f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows: [[f64; 3]; 3] = rotation.matrix().transpose().into(); // nalgebra stores columns
-    numpy::PyArray2::from_vec2(py, &rows.map(|row| row.to_vec())).expect("rows of equal length")
+    arrays::rows(py, rows.to_vec())
 }

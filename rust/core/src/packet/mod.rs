@@ -238,7 +238,7 @@ impl Decoded {
 }
 
 /// Decodes the data packets of one stream; may carry state from packet to packet.
-pub trait Decoder: Send {
+pub trait Decoder: Send + Sync {
     /// Appends the returns of `payload` to `out`; a payload of another size gives none and is counted.
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded);
 }

@@ -7,18 +7,19 @@ use super::frames::{Frame, Share};
 use super::tip::{NoTip, Plane, Tip, TipLimits, intersect};
 use crate::blade::contour::{LineExtremes, line_extremes};
 use crate::cluster::dbscan::{DbscanParams, dbscan};
+use crate::cluster::NOISE;
 use crate::cluster::line::{LineParams, line_clusters};
 use crate::cluster::radius::{Intervals, RadiusModel};
 use crate::time::Timestamp;
 
-/// How step 6 chooses its radius.
+/// How step 6 chooses its radius by equation (10).
 #[derive(Debug, Clone)]
-pub enum Radius {
-    /// Equation (10) with the right edge of the interval of d; one division per lidar, `None` for a
-    /// lidar that never saw the blade.
+pub enum RadiusRule {
+    /// From the right edge of the interval of d; one division per lidar, `None` for a lidar that
+    /// never saw the blade.
     Intervals(Vec<Option<Intervals>>),
-    /// Equation (10) with each point's own distance.
-    Continuous(RadiusModel),
+    /// From each point's own distance.
+    Continuous,
 }
 
 /// Parameters of steps 6 to 10, checked where they are made.
@@ -26,8 +27,10 @@ pub enum Radius {
 pub struct FrameParams {
     /// Optical centres of the lidars, metres, world frame.
     pub sensors_m: Vec<Point3<f64>>,
-    /// Step 6: the radius.
-    pub radius: Radius,
+    /// Step 6: equation (10).
+    pub model: RadiusModel,
+    /// Step 6: the distance that goes into it.
+    pub rule: RadiusRule,
     /// Step 6: MinPts.
     pub min_points: usize,
     /// Step 6: core if more than MinPts, as printed, instead of at least.
@@ -118,6 +121,17 @@ pub struct BladePoints {
     pub rings: Vec<u16>,
 }
 
+impl BladePoints {
+    /// At most about `count` of them, evenly chosen.
+    pub fn thinned(&self, count: usize) -> Self {
+        let step = self.rings.len().div_ceil(count.max(1)).max(1);
+        Self {
+            points_m: self.points_m.iter().step_by(step).copied().collect(),
+            rings: self.rings.iter().step_by(step).copied().collect(),
+        }
+    }
+}
+
 /// Steps 6 to 10.
 pub fn frame_contours(frame: &Frame, params: &FrameParams) -> FrameContours {
     let (uses, blades): (Vec<_>, Vec<_>) =
@@ -167,32 +181,32 @@ fn is_overhead(share: &Share, sensor_m: &Point3<f64>, limit_m: Option<f64>) -> b
 }
 
 fn without_noise(share: &Share, lidar: usize, params: &FrameParams) -> BladePoints {
-    let Some(radii) = radius_of(share, lidar, params) else { return BladePoints::default() };
-    // Points of a box are finite, so clustering cannot refuse them.
-    let Ok(labels) = dbscan(&share.points_m, &radii) else { return BladePoints::default() };
-    let kept = |index: &usize| labels[*index] >= 0;
-    let indices: Vec<usize> = (0..share.points_m.len()).filter(kept).collect();
+    // Points of a box are finite and their radii positive, so nothing can refuse them.
+    let labels = clustering(share, lidar, params).and_then(|c| dbscan(&share.points_m, &c).ok());
+    let Some(labels) = labels else { return BladePoints::default() };
+    let counts = |index: &usize| labels.as_slice()[*index] != NOISE;
+    let kept: Vec<usize> = (0..share.points_m.len()).filter(counts).collect();
     BladePoints {
-        points_m: indices.iter().map(|index| share.points_m[*index]).collect(),
-        rings: indices.iter().map(|index| share.rings[*index]).collect(),
+        points_m: kept.iter().map(|index| share.points_m[*index]).collect(),
+        rings: kept.iter().map(|index| share.rings[*index]).collect(),
     }
 }
 
-fn radius_of(share: &Share, lidar: usize, params: &FrameParams) -> Option<DbscanParams> {
+/// Parameters of step 6 for one share; `None` where it has no points or its lidar no distances.
+fn clustering(share: &Share, lidar: usize, params: &FrameParams) -> Option<DbscanParams<'static>> {
     let sensor = &params.sensors_m[lidar];
-    let min_points = params.min_points;
-    let made = match &params.radius {
-        Radius::Intervals(divisions) => {
-            let radius = divisions[lidar]?.radius_m(share.distance_m(sensor)?);
-            DbscanParams::new(radius, min_points)
+    let distance_m = share.distance_m(sensor)?;
+    let made = match &params.rule {
+        RadiusRule::Intervals(divisions) => {
+            let edge_m = divisions.get(lidar)?.as_ref()?.right_edge_m(distance_m);
+            DbscanParams::new(params.model.radius_m(edge_m), params.min_points)
         }
-        Radius::Continuous(model) => {
-            let distance = |p: &[f32; 3]| (Point3::from(p.map(f64::from)) - sensor).norm();
-            let radii = share.points_m.iter().map(|p| model.radius_m(distance(p))).collect();
-            DbscanParams::with_radii(radii, min_points)
+        RadiusRule::Continuous => {
+            let radii = params.model.radii_m(&share.points_m, (*sensor).into()).ok()?;
+            DbscanParams::new(radii, params.min_points)
         }
     };
-    made.ok().map(|made| made.strict(params.strict))
+    made.ok().map(|made| if params.strict { made.strict() } else { made })
 }
 
 /// Step 8: samples of one contour that agree on a line; the others are listed with their reason.

@@ -7,8 +7,15 @@ use nalgebra::Point3;
 use super::passthrough::PassThrough;
 use crate::error::InvalidValue;
 use crate::frame::WorldFromSensor;
-use crate::sweep::Sweep;
+use crate::sweep::{Gap, Sweep};
 use crate::time::Timestamp;
+
+/// A packet that is missing this close to the blade's first or last shot may have held its edge:
+/// 2 ms are 7 degrees at ten turns a second.
+const NEAR_BLADE_NS: i64 = 2_000_000;
+
+/// A lidar that is so far behind the others has fallen silent, and frames no longer wait for it.
+const PATIENCE_NS: i64 = 1_000_000_000;
 
 /// What one lidar gives to a frame: its points inside the box, world frame.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -97,10 +104,12 @@ impl FrameAssembler {
         let complete = |queue: &VecDeque<(Timestamp, Share)>| {
             queue.back().is_some_and(|(middle, _)| *middle >= self.next)
         };
-        let ready = match self.ended {
-            false => self.waiting.iter().all(complete),
-            // After the end as long as any lidar reaches this far.
-            true => self.waiting.iter().any(complete),
+        let newest = self.waiting.iter().filter_map(|queue| queue.back()).map(|(t, _)| *t).max();
+        let overdue = newest.is_some_and(|newest| newest - self.next > PATIENCE_NS);
+        let ready = if self.ended || overdue {
+            self.waiting.iter().any(complete)
+        } else {
+            self.waiting.iter().all(complete)
         };
         if !ready {
             return None;
@@ -124,15 +133,118 @@ fn nearest(queue: &mut VecDeque<(Timestamp, Share)>, time: Timestamp, reach_ns: 
 
 fn share_of(sweep: &Sweep, world_from_sensor: &WorldFromSensor, pass: &PassThrough) -> Share {
     let mut share = Share { present: true, ..Share::default() };
-    let mut azimuths = Vec::new();
+    let mut seen: Option<Gap> = None; // first and last shot that passed
     for (index, xyz) in sweep.cloud.xyz_m.iter().enumerate() {
         let point = world_from_sensor.transform(&Point3::from(xyz.map(f64::from)));
         let point = [point.x as f32, point.y as f32, point.z as f32];
         if pass.contains(&point) {
             share.points_m.push(point);
             share.rings.push(sweep.cloud.ring[index]);
-            azimuths.push(sweep.cloud.time_ns[index]);
+            let time = Timestamp(sweep.cloud.time_ns[index]);
+            seen = Some(Gap { from: seen.map_or(time, |s| s.from.min(time)), to: time });
         }
     }
+    // Where nothing is left of the blade, any gap may have held it.
+    let overlaps = |gap: &Gap| seen.is_none_or(|s| {
+        gap.from <= s.to + NEAR_BLADE_NS && s.from <= gap.to + NEAR_BLADE_NS
+    });
+    share.lost_on_blade = sweep.gaps.iter().any(overlaps);
     share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::{PointCloud, Return, ReturnKind};
+    use nalgebra::{Rotation3, Vector3};
+
+    const PERIOD: i64 = 100_000_000;
+
+    /// A sweep with one echo per millisecond around `middle`, at x = 1 .. 5 m of the sensor.
+    fn sweep(lidar: usize, middle: i64, gaps: Vec<Gap>) -> Sweep {
+        let mut cloud = PointCloud::default();
+        for k in 0..5i64 {
+            cloud.push(&Return {
+                xyz_m: [1.0 + k as f32, 0.0, 0.0],
+                time: Timestamp(middle + (k - 2) * 1_000_000),
+                range_m: 1.0,
+                azimuth_rad: 0.0,
+                ring: k as u16,
+                intensity: 1,
+                return_index: 0,
+                return_kind: ReturnKind::Strongest,
+                packet: 0,
+                block: 0,
+            });
+        }
+        Sweep {
+            lidar,
+            index: 0,
+            cloud,
+            start: Timestamp(middle - PERIOD / 2),
+            end: Timestamp(middle + PERIOD / 2),
+            coverage: 1.0,
+            packets: 75,
+            lost: gaps.len() as u32,
+            gaps,
+        }
+    }
+
+    fn assembler(lidars: usize) -> FrameAssembler {
+        let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::new(0.0, 0.0, 80.0));
+        let pass = PassThrough::new([1.5, -1.0, 70.0], [9.0, 1.0, 90.0]).unwrap();
+        FrameAssembler::new(vec![pose; lidars], pass, Timestamp(0), PERIOD).unwrap()
+    }
+
+    #[test]
+    fn the_nearest_sweep_of_each_lidar_makes_the_frame() {
+        let mut frames = assembler(2);
+        for k in 0..4 {
+            frames.push(&sweep(0, k * PERIOD + 10_000_000, vec![]));
+            frames.push(&sweep(1, k * PERIOD - 30_000_000, vec![]));
+        }
+        let first = frames.pop().unwrap();
+        assert_eq!(first.time, Timestamp(0));
+        assert!(first.shares.iter().all(|share| share.present));
+        // x = 1 lies outside of the box; the rest stands in the world frame.
+        assert_eq!(first.shares[0].points_m[0], [2.0, 0.0, 80.0]);
+        assert_eq!(first.shares[0].rings, [1, 2, 3, 4]);
+        assert_eq!(frames.pop().unwrap().time, Timestamp(PERIOD));
+        assert_eq!(frames.pop().unwrap().time, Timestamp(2 * PERIOD));
+        assert!(frames.pop().is_none(), "a later sweep of lidar 1 may be nearer");
+        frames.finish();
+        assert!(frames.pop().unwrap().shares.iter().all(|share| share.present));
+        assert!(frames.pop().is_none());
+    }
+
+    #[test]
+    fn a_silent_lidar_is_absent_and_does_not_hold_up_the_others() {
+        let mut frames = assembler(2);
+        frames.push(&sweep(1, 0, vec![]));
+        for k in 0..30 {
+            frames.push(&sweep(0, k * PERIOD, vec![]));
+        }
+        let present: Vec<bool> =
+            std::iter::from_fn(|| frames.pop()).map(|frame| frame.shares[1].present).collect();
+        assert!(present.len() > 15 && present[0] && !present[3]);
+    }
+
+    #[test]
+    fn only_gaps_where_the_blade_was_seen_count() {
+        let gap = |from, to| Gap { from: Timestamp(from), to: Timestamp(to) };
+        let near = sweep(0, 0, vec![gap(500_000, 1_800_000)]);
+        let far = sweep(0, 0, vec![gap(30_000_000, 31_300_000)]);
+        for (sweep, expected) in [(near, true), (far, false)] {
+            let mut frames = assembler(1);
+            frames.push(&sweep);
+            assert_eq!(frames.pop().unwrap().shares[0].lost_on_blade, expected);
+        }
+    }
+
+    #[test]
+    fn the_distance_is_from_the_mean_of_the_points() {
+        let share = Share { points_m: vec![[2.0, 0.0, 80.0], [4.0, 0.0, 80.0]], ..Share::default() };
+        assert_eq!(share.distance_m(&Point3::new(0.0, 4.0, 80.0)), Some(5.0));
+        assert_eq!(Share::default().distance_m(&Point3::origin()), None);
+    }
 }

@@ -11,11 +11,13 @@
 //! | 9 contour curves (14) | [`curves`] |
 //! | 10 tip | [`tip`] |
 //! | 11 sections by arc length (15) | [`sections`] |
-//! | 5-10 of one frame, put together | [`frame`] |
+//! | 6-10 of one frame, put together | [`frame`] |
+//! | all frames of a test | [`series`] |
 
 pub mod curves;
 pub mod frame;
 pub mod frames;
 pub mod passthrough;
 pub mod sections;
+pub mod series;
 pub mod tip;

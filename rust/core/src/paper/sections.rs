@@ -29,6 +29,16 @@ impl<'a> MidLine<'a> {
         ]
     }
 
+    /// Leading minus trailing edge at `z_m`, metres; along z it is nothing by construction.
+    pub fn chord_m(&self, z_m: f64) -> [f64; 3] {
+        let (a, b) = (self.leading, self.trailing);
+        [
+            a.x.estimate.eval(z_m) - b.x.estimate.eval(z_m),
+            a.y.estimate.eval(z_m) - b.y.estimate.eval(z_m),
+            0.0,
+        ]
+    }
+
     /// Arc length per metre of z: the integrand of (15) with t = z.
     fn stretch(&self, z_m: f64) -> f64 {
         let mean = |a: f64, b: f64| 0.5 * (a + b);

@@ -1,7 +1,5 @@
 //! Step 10: the tip as the intersection of both contour curves, projected on a plane.
 
-use std::fmt;
-
 use super::curves::ContourCurve;
 use crate::error::InvalidValue;
 use crate::fit::Fit;
@@ -57,12 +55,13 @@ pub enum NoTip {
     IllPosed,
 }
 
-impl fmt::Display for NoTip {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+impl NoTip {
+    /// Word for tables.
+    pub fn name(self) -> &'static str {
+        match self {
             NoTip::NoIntersection => "no_intersection",
             NoTip::IllPosed => "ill_posed",
-        })
+        }
     }
 }
 
@@ -148,6 +147,6 @@ mod tests {
         assert!(matches!(failure, NoTip::IllPosed | NoTip::NoIntersection));
         let [leading, trailing] = contours(500.0, 0.0);
         let failure = intersect(&leading, &trailing, Plane::Xoz, &limits).unwrap_err();
-        assert_eq!(failure.to_string(), "no_intersection");
+        assert_eq!(failure.name(), "no_intersection");
     }
 }

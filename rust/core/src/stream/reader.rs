@@ -112,6 +112,11 @@ impl SweepReader {
         self.ready.pop_front()
     }
 
+    /// Whether [`SweepReader::pop`] would give a sweep.
+    pub fn has_ready(&self) -> bool {
+        !self.ready.is_empty()
+    }
+
     /// Whether all lidars have passed the end that was asked for, so that reading on is no use.
     pub fn is_done(&self) -> bool {
         self.lanes.values().all(|lane| lane.is_done)

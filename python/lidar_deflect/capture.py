@@ -1,0 +1,371 @@
+"""Captures: open them, tell what they hold, iterate over the sweeps of their lidars."""
+
+import html
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from lidar_deflect import _native
+from lidar_deflect._native import Sweep, SweepIterator
+from lidar_deflect.errors import InvalidValueError
+from lidar_deflect.streams import StreamInfo, no_lidar, same_address, stream, utc
+
+__all__ = ["RETURN_KINDS", "Capture", "StreamInfo", "Sweep", "Sweeps", "open", "sensor_models"]
+
+Progress = Callable[[int, int], None]
+"""Called with bytes of capture done and in total."""
+
+INFO_SCHEMA = "lidar-deflect.info/1"
+
+RETURN_KINDS = ("strongest", "last", "first", "second", "merged")
+"""Names of the numbers in `Sweep.return_kind`."""
+
+NANOS_PER_SECOND = 1_000_000_000
+
+
+class Sweeps(Iterator[Sweep]):
+    """Sweeps as they complete; what `Capture.sweeps` returns."""
+
+    def __init__(self, native: SweepIterator) -> None:
+        self._native = native
+
+    def __next__(self) -> Sweep:
+        return next(self._native)
+
+    @property
+    def merged(self) -> int:
+        """Second returns so far that repeat the first and were merged into it."""
+        return self._native.merged
+
+
+class Capture:
+    """The captures of one recording, read when something is asked for.
+
+    Made by `open`. The files are scanned once, on the first question, and the findings kept.
+    """
+
+    def __init__(
+        self,
+        paths: Sequence[Path],
+        sensors: Mapping[str, str],
+        ids: Mapping[str, str | None],
+    ) -> None:
+        self.paths = tuple(paths)
+        self._sensors = dict(sensors)
+        self._ids = dict(ids)
+        self._scan: _native.CaptureScan | None = None
+        self._streams: tuple[StreamInfo, ...] = ()
+        self._described: dict[str, Any] = {}
+
+    def scan(self, progress: Progress | None = None) -> None:
+        """Read the files once, if that was not done yet; everything else does so by itself.
+
+        Raises
+        ------
+        CaptureError
+            If there is no lidar in them (``capture.no_lidar``), or a file is no capture.
+        """
+        if self._scan is not None:
+            return
+        scan = _native.scan_capture(
+            self.paths, sensors=list(self._sensors.items()), progress=progress
+        )
+        described = scan.describe()
+        if not described["streams"]:
+            raise no_lidar(self.paths, described)
+        found = tuple(stream(entry) for entry in described["streams"])
+        self._streams = _named(found, self._ids)
+        self._described = described
+        self._scan = scan
+
+    @property
+    def native(self) -> _native.CaptureScan:
+        """The scan of the compiled core, for functions that read the capture there."""
+        self.scan()
+        assert self._scan is not None
+        return self._scan
+
+    @property
+    def streams(self) -> tuple[StreamInfo, ...]:
+        """All lidars that were found, ordered by address and port."""
+        self.scan()
+        return self._streams
+
+    @property
+    def lidars(self) -> tuple[str, ...]:
+        """Names of the lidars: ids of the configuration in its order, else ``address:port``."""
+        names = [stream.lidar for stream in self.streams]
+        return tuple(name for name in self._ids if name in names) if self._ids else tuple(names)
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Ids of the configuration that never send in this capture."""
+        return tuple(name for name in self._ids if name not in self.lidars)
+
+    @property
+    def first_time_ns(self) -> int:
+        """UTC of the first accepted lidar packet, nanoseconds: ``t_s`` 0."""
+        return int(self.native.first_time_ns or 0)
+
+    @property
+    def last_time_ns(self) -> int:
+        """UTC of the end of the last lidar packet, nanoseconds."""
+        return int(self.native.last_time_ns or 0)
+
+    @property
+    def drops(self) -> Mapping[str, int]:
+        """Records, datagrams and packets that gave no points, by reason."""
+        self.scan()
+        pairs = self._described["drops"]
+        return MappingProxyType({pair["reason"]: pair["count"] for pair in pairs})
+
+    def info(self, quick: bool = False, *, progress: Progress | None = None) -> dict[str, Any]:
+        """Tell what the capture holds, as the document of ``info --json``.
+
+        Parameters
+        ----------
+        quick
+            Read only as much as tells the sensors apart, if the capture was not read yet.
+        progress
+            Called with bytes done and in total.
+        """
+        del quick
+        self.scan(progress)
+        described = self._described
+        return {
+            "schema": INFO_SCHEMA,
+            "captures": [_file(entry) for entry in described["captures"]],
+            "streams": [stream.document() for stream in self._streams],
+            "other_streams": described["other_streams"],
+            "drops": described["drops"],
+            "fragments": described["fragments"],
+            "datagrams": described["datagrams"],
+            "pauses": [[utc(start), utc(stop)] for start, stop in described["pauses_ns"]],
+            "first_utc": utc(self.first_time_ns),
+            "last_utc": utc(self.last_time_ns),
+        }
+
+    def health(self) -> dict[str, NDArray[Any]]:
+        """Count what arrived per second and lidar.
+
+        Returns
+        -------
+        dict
+            Columns of equal length, ordered by second, then lidar: ``time_ns`` (start of the
+            second), ``lidar``, ``packets``, ``lost``, ``duplicated``, ``late``, ``foreign``,
+            ``points``, ``rpm`` and ``clock_offset_s`` (NaN where nothing arrived), ``coverage``.
+        """
+        columns = self.native.health()
+        names = {stream.address: stream.lidar for stream in self._streams}
+        columns["lidar"] = np.array([names[address] for address in columns["lidar"]], dtype=str)
+        kept = np.isin(columns["lidar"], self.lidars)
+        return {name: np.asarray(column)[kept] for name, column in columns.items()}
+
+    def sweeps(
+        self,
+        lidar: str | Sequence[str] | None = None,
+        *,
+        start_s: float | None = None,
+        stop_s: float | None = None,
+        cut_azimuth_deg: float = 0.0,
+        progress: Progress | None = None,
+    ) -> Sweeps:
+        """Iterate over the turns of one lidar or several, in the order in which they complete.
+
+        Parameters
+        ----------
+        lidar
+            Name of a lidar, several names, or None for all.
+        start_s, stop_s
+            Packets before and from these times on are left out; seconds since the first accepted
+            lidar packet.
+        cut_azimuth_deg
+            Where one sweep ends and the next begins, in the sensor's own sense of rotation.
+        progress
+            Called with bytes done and in total.
+
+        Returns
+        -------
+        Sweeps
+            Iterator over `Sweep`: ``xyz`` of shape (n, 3), metres in the sensor frame, and the
+            columns ``time_ns ring range_m azimuth_deg intensity return_index return_kind packet
+            block`` of length n, with ``lidar index start_ns end_ns coverage packets lost``.
+
+        Raises
+        ------
+        InvalidValueError
+            If there is no such lidar.
+        CaptureError
+            If two sensors send under the lidar's name (``capture.same_address``).
+        """
+        numbers = self.numbers(lidar)
+        native = SweepIterator(
+            self.native,
+            lidars=numbers,
+            names=[stream.lidar for stream in self.streams],
+            cut_rad=[math.radians(cut_azimuth_deg)] * len(self.streams),
+            start_ns=self.instant_ns(start_s),
+            stop_ns=self.instant_ns(stop_s),
+            progress=progress,
+        )
+        return Sweeps(native)
+
+    def numbers(self, lidar: str | Sequence[str] | None = None) -> list[int]:
+        """Numbers in `streams` of lidars by name; all those of `lidars` for None.
+
+        Raises
+        ------
+        InvalidValueError
+            If there is no such lidar.
+        CaptureError
+            If two sensors send under a lidar's name.
+        """
+        names = self.lidars if lidar is None else [lidar] if isinstance(lidar, str) else lidar
+        numbers = [self._number(name) for name in names]
+        for number in numbers:
+            conflict = self.streams[number].conflict
+            if conflict is not None:
+                raise same_address(conflict)
+        return numbers
+
+    def _number(self, name: str) -> int:
+        places = [place for place, stream in enumerate(self.streams) if stream.matches(name)]
+        if len(places) != 1:
+            raise InvalidValueError(
+                f"lidar: expected one of {', '.join(self.lidars)}, found {name!r}",
+                code="capture.unknown_lidar",
+                hint="name a lidar as `info` lists it",
+            )
+        return places[0]
+
+    def instant_ns(self, time_s: float | None) -> int | None:
+        """UTC nanoseconds of a time in seconds since the first accepted lidar packet."""
+        if time_s is None:
+            return None
+        if not math.isfinite(time_s):
+            raise InvalidValueError(f"time: expected seconds, found {time_s}")
+        return self.first_time_ns + round(time_s * NANOS_PER_SECOND)
+
+    def __repr__(self) -> str:
+        names = ", ".join(path.name for path in self.paths)
+        if self._scan is None:
+            return f"<Capture {names}: not read yet>"
+        seconds = (self.last_time_ns - self.first_time_ns) / NANOS_PER_SECOND
+        return f"<Capture {names}: {len(self._streams)} lidars, {seconds:.1f} s>"
+
+    def _repr_html_(self) -> str:
+        header = ("lidar", "model", "return", "rpm", "packets", "lost", "late", "clock")
+        rows = [
+            (
+                s.lidar,
+                s.title,
+                s.return_mode,
+                f"{s.rpm:.0f}",
+                s.packets,
+                s.lost,
+                s.late,
+                s.clock_kind,
+            )
+            for s in self.streams
+        ]
+        head = "".join(f"<th>{name}</th>" for name in header)
+        cells = ("".join(f"<td>{html.escape(str(cell))}</td>" for cell in row) for row in rows)
+        body = "".join(f"<tr>{row}</tr>" for row in cells)
+        return f"<p>{html.escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
+
+
+def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
+    path: str | Path | Sequence[str | Path],
+    *,
+    config: Any = None,
+    sensors: Mapping[str, str] | None = None,
+    beams: Mapping[str, Any] | None = None,
+) -> Capture:
+    """Open the captures of one recording; they are read when something is asked for.
+
+    Parameters
+    ----------
+    path
+        pcap or pcapng, plain, gzip or zstd; one file, or many: rotated, or one per lidar.
+    config
+        A `Test` or `Config`, whose lidars then give names and models.
+    sensors
+        Models by source, for sensors that the content does not tell: ``{"10.0.0.5": "vlp16"}``.
+    beams
+        Files of single units by source. None of the models that are known takes any yet.
+
+    Returns
+    -------
+    Capture
+
+    Raises
+    ------
+    CaptureNotFoundError
+        If a file is not there.
+    CaptureError
+        If a file is no capture.
+    InvalidValueError
+        If a model is not known.
+    """
+    paths = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
+    if beams:
+        raise InvalidValueError(
+            f"beams: expected none, found files for {', '.join(name or 'all' for name in beams)}",
+            code="beams.not_needed",
+            hint="the known models have their beams from the factory table: leave --beams out",
+        )
+    _native.check_captures(paths)
+    lidars = _lidars_of(config)
+    ids = {lidar.id: lidar.source for lidar in lidars}
+    named = {lidar.source: lidar.model for lidar in lidars if lidar.source}
+    named = {source: model for source, model in named.items() if model != "auto"}
+    known = dict(sensor_models())
+    for model in (named | dict(sensors or {})).values():
+        if model not in known:
+            raise InvalidValueError(
+                f"sensor model: expected one of {', '.join(known)}, found {model!r}",
+                code="sensor.unknown",
+            )
+    return Capture(paths, named | dict(sensors or {}), ids)
+
+
+def sensor_models() -> tuple[tuple[str, str], ...]:
+    """Ids of the known sensor models, each with its name."""
+    return tuple(_native.sensor_models())
+
+
+def _lidars_of(config: Any) -> Sequence[Any]:
+    """Lidars of a `Config`, or of a `Test` that holds one."""
+    holder = getattr(config, "config", config)
+    return tuple(getattr(holder, "lidars", ()))
+
+
+def _named(
+    streams: tuple[StreamInfo, ...], ids: Mapping[str, str | None]
+) -> tuple[StreamInfo, ...]:
+    """Give the streams the ids of the configuration."""
+
+    def name(stream: StreamInfo) -> str:
+        for lidar, source in ids.items():
+            if source is not None and stream.matches(source):
+                return lidar
+        if len(ids) == len(streams) == 1 and None in ids.values():
+            return next(iter(ids))
+        return stream.lidar
+
+    return tuple(replace(stream, lidar=name(stream)) for stream in streams)
+
+
+def _file(entry: Mapping[str, Any]) -> dict[str, Any]:
+    times = {"first_host_ns": "first_host_utc", "last_host_ns": "last_host_utc"}
+    shown = {name: value for name, value in entry.items() if name not in times}
+    shown["path"] = str(entry["path"])
+    for name, title in times.items():
+        shown[title] = None if entry[name] is None else utc(entry[name])
+    return shown

@@ -1,0 +1,223 @@
+//! The frames of a whole test: steps 6 to 10 in parallel, then questions asked of all of them.
+
+use rayon::prelude::*;
+
+use super::frame::{BladePoints, FrameContours, FrameParams, ShareUse, blade_of, frame_contours};
+use super::frames::Frame;
+use super::sections::MidLine;
+use super::tip::Plane;
+use crate::time::Timestamp;
+use nalgebra::Point3;
+
+/// Smallest and largest distance d of equation (10) of each lidar.
+#[derive(Debug, Clone)]
+pub struct DistanceRanges(Vec<Option<[f64; 2]>>);
+
+impl DistanceRanges {
+    /// Nothing seen yet by so many lidars.
+    pub fn new(lidars: usize) -> Self {
+        Self(vec![None; lidars])
+    }
+
+    /// Takes more frames of lidars at these places, metres.
+    pub fn extend(&mut self, frames: &[Frame], sensors_m: &[Point3<f64>]) {
+        for frame in frames {
+            for ((range, share), sensor) in self.0.iter_mut().zip(&frame.shares).zip(sensors_m) {
+                let Some(d) = share.distance_m(sensor) else { continue };
+                let [low, high] = range.unwrap_or([d, d]);
+                *range = Some([low.min(d), high.max(d)]);
+            }
+        }
+    }
+
+    /// Per lidar, metres; `None` where it saw no blade.
+    pub fn ranges_m(&self) -> &[Option<[f64; 2]>] {
+        &self.0
+    }
+}
+
+/// What of some frames is kept to look at.
+#[derive(Debug, Clone, Copy)]
+pub struct Sampling {
+    /// One frame in so many.
+    pub every: usize,
+    /// At most so many points of one lidar.
+    pub points: usize,
+}
+
+/// Columns of blade points that were kept.
+#[derive(Debug, Clone, Default)]
+pub struct PointColumns {
+    /// Middle of the frame, nanoseconds.
+    pub time_ns: Vec<i64>,
+    /// Number of the lidar.
+    pub lidar: Vec<u32>,
+    /// Beam.
+    pub ring: Vec<u32>,
+    /// Position, metres, world frame.
+    pub xyz_m: Vec<[f32; 3]>,
+}
+
+impl PointColumns {
+    fn extend(&mut self, time: Timestamp, lidar: usize, blade: &BladePoints) {
+        let count = blade.rings.len();
+        self.time_ns.extend(std::iter::repeat_n(time.0, count));
+        self.lidar.extend(std::iter::repeat_n(lidar as u32, count));
+        self.ring.extend(blade.rings.iter().map(|ring| u32::from(*ring)));
+        self.xyz_m.extend_from_slice(&blade.points_m);
+    }
+}
+
+/// Columns of contour samples that were left out (step 8).
+#[derive(Debug, Clone, Default)]
+pub struct LeftOutColumns {
+    /// Middle of the frame, nanoseconds.
+    pub time_ns: Vec<i64>,
+    /// Why.
+    pub reason: Vec<&'static str>,
+    /// Samples.
+    pub count: Vec<u32>,
+    /// Centre of the cluster, metres, world frame.
+    pub centre_m: Vec<[f64; 3]>,
+}
+
+/// Contours of all frames in the order of time.
+#[derive(Debug)]
+pub struct ContourSeries {
+    params: FrameParams,
+    sampling: Sampling,
+    frames: Vec<FrameContours>,
+    points: PointColumns,
+}
+
+impl ContourSeries {
+    /// Nothing yet.
+    pub fn new(params: FrameParams, sampling: Sampling) -> Self {
+        Self { params, sampling, frames: Vec::new(), points: PointColumns::default() }
+    }
+
+    /// Takes the next frames, in parallel; the order and the bits of the results do not depend on it.
+    pub fn extend(&mut self, frames: &[Frame]) {
+        let (params, sampling, done) = (&self.params, self.sampling, self.frames.len());
+        let results: Vec<(FrameContours, Vec<BladePoints>)> = frames
+            .par_iter()
+            .enumerate()
+            .map(|(index, frame)| {
+                let wanted = (done + index).is_multiple_of(sampling.every.max(1));
+                let blades = if wanted { sample(frame, params, sampling) } else { Vec::new() };
+                (frame_contours(frame, params), blades)
+            })
+            .collect();
+        for (contours, blades) in results {
+            for (lidar, blade) in blades.iter().enumerate() {
+                self.points.extend(contours.time, lidar, blade);
+            }
+            self.frames.push(contours);
+        }
+    }
+
+    /// All frames.
+    pub fn frames(&self) -> &[FrameContours] {
+        &self.frames
+    }
+
+    /// Points that were kept to look at.
+    pub fn sampled_points(&self) -> PointColumns {
+        self.points.clone()
+    }
+
+    /// Contour samples that were left out, of the frames whose points were kept.
+    pub fn left_out(&self) -> LeftOutColumns {
+        let mut columns = LeftOutColumns::default();
+        for frame in self.frames.iter().step_by(self.sampling.every.max(1)) {
+            for rejected in &frame.rejected {
+                columns.time_ns.push(frame.time.0);
+                columns.reason.push(rejected.reason);
+                columns.count.push(rejected.count);
+                columns.centre_m.push(rejected.centre_m);
+            }
+        }
+        columns
+    }
+
+    /// What keeps each frame from a tip on a plane, `None` where nothing does.
+    pub fn failures(&self, plane: Plane) -> Vec<Option<&'static str>> {
+        let of = |frame: &FrameContours| match (&frame.contours, frame.tip(plane)) {
+            (None, _) if frame.uses.iter().any(|used| used.used > 0) => Some("few_samples"),
+            (None, _) => Some("no_points"),
+            (_, Err(failure)) => Some(failure.name()),
+            (_, Ok(_)) => None,
+        };
+        self.frames.iter().map(of).collect()
+    }
+
+    /// First and last z of the contours of each frame, metres; NaN without contours.
+    pub fn seen_z_m(&self) -> Vec<[f64; 2]> {
+        let of = |frame: &FrameContours| match &frame.contours {
+            None => [f64::NAN; 2],
+            Some(both) => {
+                let (a, b) = (both.leading.seen_z_m, both.trailing.seen_z_m);
+                [a[0].min(b[0]), a[1].max(b[1])]
+            }
+        };
+        self.frames.iter().map(of).collect()
+    }
+
+    /// z of the tip of each frame, metres; NaN where there is none.
+    pub fn tip_z_m(&self, plane: Plane) -> Vec<f64> {
+        self.frames.iter().map(|frame| frame.tip(plane).map_or(f64::NAN, |tip| tip.z_m)).collect()
+    }
+
+    /// Arc length (15) from each z to the tip, metres; frame by frame, NaN without a tip.
+    pub fn arc_to_tip_m(&self, plane: Plane, z_m: &[f64]) -> Vec<f64> {
+        self.at_each(z_m, f64::NAN, |frame, z| {
+            let tip = frame.tip(plane).ok()?;
+            Some(mid_line(frame)?.length_m(z, tip.z_m))
+        })
+    }
+
+    /// Points of the mid-chord line so far before the tip, metres; frame by frame, NaN without one.
+    pub fn sections_m(&self, plane: Plane, to_tip_m: &[f64]) -> Vec<[f64; 3]> {
+        self.at_each(to_tip_m, [f64::NAN; 3], |frame, length| {
+            let tip = frame.tip(plane).ok()?;
+            Some(mid_line(frame)?.before_tip_m(tip.z_m, length))
+        })
+    }
+
+    /// Points of the mid-chord line at each z, metres; frame by frame, NaN without contours.
+    pub fn points_at_m(&self, z_m: &[f64]) -> Vec<[f64; 3]> {
+        self.at_each(z_m, [f64::NAN; 3], |frame, z| Some(mid_line(frame)?.point_m(z)))
+    }
+
+    /// Leading minus trailing edge at each z, metres; frame by frame, NaN without contours.
+    pub fn chords_at_m(&self, z_m: &[f64]) -> Vec<[f64; 3]> {
+        self.at_each(z_m, [f64::NAN; 3], |frame, z| Some(mid_line(frame)?.chord_m(z)))
+    }
+
+    /// What became of each lidar's share, frame by frame.
+    pub fn uses<T>(&self, of: impl Fn(&ShareUse) -> T) -> Vec<T> {
+        self.frames.iter().flat_map(|frame| frame.uses.iter().map(&of)).collect()
+    }
+
+    fn at_each<T: Clone + Send + Sync>(
+        &self,
+        places: &[f64],
+        missing: T,
+        of: impl Fn(&FrameContours, f64) -> Option<T> + Sync,
+    ) -> Vec<T> {
+        let row = |frame: &FrameContours| -> Vec<T> {
+            places.iter().map(|p| of(frame, *p).unwrap_or_else(|| missing.clone())).collect()
+        };
+        let rows: Vec<Vec<T>> = self.frames.par_iter().map(row).collect();
+        rows.concat()
+    }
+}
+
+fn mid_line(frame: &FrameContours) -> Option<MidLine<'_>> {
+    frame.contours.as_ref().map(|both| MidLine::new(&both.leading, &both.trailing))
+}
+
+fn sample(frame: &Frame, params: &FrameParams, sampling: Sampling) -> Vec<BladePoints> {
+    let of = |(lidar, share)| blade_of(share, lidar, params).1.thinned(sampling.points);
+    frame.shares.iter().enumerate().map(of).collect()
+}

@@ -1,0 +1,126 @@
+//! Captures across the border: a scan, sweeps, and the files between.
+
+mod columns;
+mod describe;
+mod feed;
+mod sweeps;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use lidar_deflect_core::packet;
+use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, Source};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::error::BorderResult;
+use feed::Feed;
+
+/// What a scan of a capture found: the base for everything that reads the capture again.
+#[pyclass(frozen, name = "CaptureScan", module = "lidar_deflect._native")]
+pub struct CaptureScan {
+    /// Files of the capture.
+    pub paths: Vec<PathBuf>,
+    /// What was found.
+    pub report: Arc<ScanReport>,
+    files: feed::FilesReport,
+}
+
+#[pymethods]
+impl CaptureScan {
+    /// Names of the lidars, `address:port`, in the order of their numbers.
+    #[getter]
+    fn lidars(&self) -> Vec<String> {
+        let lidars = self.report.lidars.iter();
+        lidars.map(|lidar| lidar.key.to_string()).collect()
+    }
+
+    /// UTC of the first accepted lidar packet, nanoseconds.
+    #[getter]
+    fn first_time_ns(&self) -> Option<i64> {
+        self.report.first.map(|time| time.0)
+    }
+
+    /// UTC of the end of the last lidar packet, nanoseconds.
+    #[getter]
+    fn last_time_ns(&self) -> Option<i64> {
+        self.report.last.map(|time| time.0)
+    }
+
+    /// Everything that was found, as plain dictionaries.
+    fn describe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        describe::scan(py, &self.report, &self.files)
+    }
+
+    /// Columns of counts per second and lidar.
+    fn health<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        columns::health(py, &self.report)
+    }
+}
+
+/// Reads a capture once and tells what is in it.
+///
+/// `sensors` are pairs of a source and a model id; `progress` is called with bytes done and total.
+#[pyfunction]
+#[pyo3(signature = (paths, *, sensors, progress=None))]
+#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
+fn scan_capture(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    sensors: Vec<(String, String)>,
+    progress: Option<Py<PyAny>>,
+) -> BorderResult<CaptureScan> {
+    let mut options = ScanOptions::default();
+    for (source, id) in &sensors {
+        let named = (Source::parse(source)?, packet::model(id)?);
+        options.models.push(named);
+    }
+    let (mut report, mut files) = scan_once(py, &paths, options, progress.as_ref())?;
+    if let Some(options) = report.split() {
+        (report, files) = scan_once(py, &paths, options, progress.as_ref())?;
+    }
+    Ok(CaptureScan {
+        paths,
+        report: Arc::new(report),
+        files,
+    })
+}
+
+fn scan_once(
+    py: Python<'_>,
+    paths: &[PathBuf],
+    options: ScanOptions,
+    progress: Option<&Py<PyAny>>,
+) -> BorderResult<(ScanReport, feed::FilesReport)> {
+    let mut feed = Feed::open(py, paths)?;
+    let mut scan = Scan::new(options);
+    while feed.block(py, progress, |datagram| {
+        scan.push(datagram);
+        feed::Want::More
+    })? {}
+    let report = py.detach(|| scan.finish());
+    Ok((report, feed.report()))
+}
+
+/// Looks at the first bytes of all files, so that what is no capture is told at once.
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
+fn check_captures(py: Python<'_>, paths: Vec<PathBuf>) -> BorderResult<()> {
+    Feed::open(py, &paths).map(|_| ())
+}
+
+/// Ids of the sensor models that are known, with their names.
+#[pyfunction]
+fn sensor_models() -> Vec<(&'static str, &'static str)> {
+    let models = packet::MODELS.iter();
+    models.map(|model| (model.id(), model.title())).collect()
+}
+
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<CaptureScan>()?;
+    module.add_class::<sweeps::Sweep>()?;
+    module.add_class::<sweeps::SweepIterator>()?;
+    module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(check_captures, module)?)?;
+    module.add_function(wrap_pyfunction!(sensor_models, module)?)
+}

@@ -1,0 +1,102 @@
+//! Datagrams in blocks: the interpreter lock is free within a block; between blocks progress is told
+//! and Ctrl-C comes through.
+
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+use lidar_deflect_core::capture::{Datagram, FragmentFacts};
+use lidar_deflect_core::drops::Drops;
+use lidar_deflect_files::{CaptureSet, FileError, FileFacts};
+use pyo3::prelude::*;
+
+use crate::error::BorderResult;
+
+/// A block ends after so long, so that Ctrl-C is felt at once.
+const BLOCK: Duration = Duration::from_millis(100);
+/// The time is looked at after so many datagrams.
+const STRIDE: u32 = 256;
+
+/// Whether the taker of datagrams wants another one in this block.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Want {
+    /// Go on.
+    More,
+    /// There is something to hand over.
+    Pause,
+    /// Nothing that follows is of use.
+    Stop,
+}
+
+/// The files of a capture, being read.
+pub struct Feed {
+    set: CaptureSet,
+    has_ended: bool,
+}
+
+/// What was seen in the files.
+#[derive(Clone)]
+pub struct FilesReport {
+    /// Facts of each file.
+    pub files: Vec<FileFacts>,
+    /// Records that gave no datagram, by reason.
+    pub drops: Drops,
+    /// IP fragments.
+    pub fragments: FragmentFacts,
+}
+
+impl Feed {
+    /// Opens all files.
+    pub fn open(py: Python<'_>, paths: &[PathBuf]) -> BorderResult<Self> {
+        let set = py.detach(|| CaptureSet::open(paths))?;
+        Ok(Self {
+            set,
+            has_ended: false,
+        })
+    }
+
+    /// Hands datagrams to `take` until the block ends; `false` when there are no more.
+    pub fn block(
+        &mut self,
+        py: Python<'_>,
+        progress: Option<&Py<PyAny>>,
+        take: impl FnMut(&Datagram<'_>) -> Want + Send,
+    ) -> BorderResult<bool> {
+        if !self.has_ended {
+            py.detach(|| self.run(take))?;
+        }
+        py.check_signals()?;
+        if let Some(progress) = progress {
+            progress.call1(py, (self.set.bytes_done(), self.set.bytes_total()))?;
+        }
+        Ok(!self.has_ended)
+    }
+
+    fn run(&mut self, mut take: impl FnMut(&Datagram<'_>) -> Want) -> Result<(), FileError> {
+        let start = Instant::now();
+        for number in 1_u32.. {
+            let Some(datagram) = self.set.next()? else {
+                self.has_ended = true;
+                break;
+            };
+            match take(&datagram) {
+                Want::More if number % STRIDE == 0 && start.elapsed() > BLOCK => break,
+                Want::More => {}
+                Want::Pause => break,
+                Want::Stop => {
+                    self.has_ended = true;
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What was seen so far.
+    pub fn report(&self) -> FilesReport {
+        FilesReport {
+            files: self.set.facts(),
+            drops: self.set.drops().clone(),
+            fragments: self.set.fragments(),
+        }
+    }
+}

@@ -1,0 +1,203 @@
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+import polars as pl
+import pytest
+
+import folders
+from lidar_deflect import tables
+from lidar_deflect.errors import InvalidValueError
+from lidar_deflect.plots import Plots, style
+
+
+@dataclass
+class Result:
+    """What figures need of a result, and no more."""
+
+    deflection: pl.DataFrame
+    steps: pl.DataFrame
+    health: pl.DataFrame = field(default_factory=folders.health)
+    comparison: pl.DataFrame | None = None
+    contour: pl.DataFrame | None = None
+    config: dict[str, Any] | None = None
+
+
+def result(frame: pl.DataFrame | None = None, **more: Any) -> Result:
+    frame = folders.deflection() if frame is None else frame
+    return Result(frame, folders.step_table(frame), **more)
+
+
+def trace(figure: go.Figure, name: str) -> Any:
+    return next(each for each in figure.data if each.name == name)
+
+
+def test_a_time_series_has_the_three_components_of_its_section_with_gaps() -> None:
+    figure = Plots(result()).time_series("S84")
+    lines = [each for each in figure.data if each.mode == "lines"]
+    assert [each.name for each in lines] == ["x", "y", "z"]
+    x = np.array(lines[0].y, dtype=float)
+    assert x[-1] == pytest.approx(3.28)
+    assert np.isnan(x).sum() == 5  # the frames of the overhead stretch that were not filled
+    assert not lines[0].connectgaps
+    assert [axis.title.text for axis in (figure.layout.yaxis, figure.layout.yaxis3)] == [
+        "dx (m)",
+        "dz (m)",
+    ]
+    assert figure.layout.xaxis3.title.text == "time (s)"
+
+
+def test_the_tip_is_the_outermost_section_unless_one_is_called_so() -> None:
+    only = result(folders.deflection(folders.SHAPE))
+    assert Plots(only).time_series("tip").layout.meta["section"] == "S100"
+    assert Plots(only).time_series().layout.meta["section"] == "S100"
+    assert Plots(only).time_series(84.0).layout.meta["section"] == "S84"
+    with pytest.raises(InvalidValueError, match="no section 'S48'") as caught:
+        Plots(only).time_series("S48")
+    assert caught.value.hint == "did you mean 'S84'?"
+
+
+def test_statuses_are_marked_and_missing_stretches_tinted() -> None:
+    figure = Plots(result()).time_series("S84")
+    marks = trace(figure, "interpolated")
+    assert set(marks.text) == {"overhead"}
+    assert len(marks.x) == 6
+    assert trace(figure, "missing").showlegend is None
+    # three holds on three panels, and one missing stretch on three panels
+    assert len(figure.layout.shapes) == 3 * 3 + 3
+    assert [each.text for each in figure.layout.annotations] == ["0 %", "40 %", "100 %"]
+
+
+def test_the_band_of_uncertainty_is_drawn_where_there_is_one() -> None:
+    frame = folders.deflection(u_m=0.01, overhead_s=None)
+    figure = Plots(result(frame)).time_series("S84")
+    bands = [each for each in figure.data if each.fill == "toself"]
+    assert len(bands) == 3
+    width = np.ptp(np.array(bands[0].y, dtype=float)[[0, -1]])
+    assert width == pytest.approx(2 * 1.96 * 0.01)
+    assert not [e for e in Plots(result()).time_series().data if e.fill == "toself"]
+
+
+def test_positions_are_drawn_on_demand() -> None:
+    figure = Plots(result()).time_series("S84", quantity="position")
+    assert np.nanmax(np.array(trace(figure, "z").y, dtype=float)) == pytest.approx(84.0)
+    assert figure.layout.yaxis.title.text == "x (m)"
+
+
+def test_long_series_are_thinned() -> None:
+    frame = folders.deflection(folders.TIP)
+    many = pl.concat([frame.with_columns(pl.col("t_s") + 20.0 * k) for k in range(100)])
+    figure = Plots(Result(many, folders.step_table(frame))).time_series()
+    assert 3000 < len(figure.data[0].x) <= 6000
+
+
+def compared(*rows: tuple[str, str, str, float, float]) -> pl.DataFrame:
+    columns: dict[str, tables.Values] = dict.fromkeys(tables.SCHEMAS["comparison"].names)
+    columns |= {"time": [folders.EPOCH_NS] * len(rows), "t_s": [0.0] * len(rows)}
+    columns |= {"step": ["100 %"] * len(rows), "s_m": [84.0] * len(rows)}
+    names = ("section", "source", "quantity", "measured_m", "reference_m")
+    columns |= dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+    measured, reference = (np.array(columns[name]) for name in names[3:])
+    columns |= {"error_percent": 100.0 * (measured - reference) / reference}
+    return tables.build("comparison", columns)
+
+
+def test_errors_are_drawn_by_method_as_in_the_papers_figure_20() -> None:
+    frame = compared(
+        ("S84", "W84", "total", 3.318, 3.094), ("S84", "prediction", "total", 3.318, 3.273)
+    )
+    figure = Plots(result(comparison=frame)).comparison()
+    assert {bar.name: round(bar.y[0], 2) for bar in figure.data} == {
+        "wire against prediction": -5.47,
+        "lidar against prediction": 1.37,
+    }
+    assert figure.layout.yaxis.title.text == "error (%)"
+
+
+def test_without_a_trusted_reference_lidar_is_drawn_against_each_source() -> None:
+    frame = compared(("S84", "W84", "wire", 3.1, 3.0), ("S84", "W84", "total", 3.3, 3.0))
+    figure = Plots(result(comparison=frame)).comparison()
+    assert [bar.name for bar in figure.data] == [
+        "lidar against W84, wire",
+        "lidar against W84, total",
+    ]
+
+
+def test_load_deflection_has_a_line_and_its_holds_per_section() -> None:
+    figure = Plots(result(folders.deflection(u_m=0.01))).load_deflection()
+    assert len(figure.data) == 2 * 3
+    assert list(figure.data[-1].x) == pytest.approx([0.0, 40.0, 100.0])
+    assert figure.data[-1].error_y.array[0] == pytest.approx(0.0196)
+
+
+def test_shapes_are_drawn_from_the_blade_line_where_there_is_one() -> None:
+    own = result()
+    figure = Plots(own).deflected_shapes()
+    assert [each.name for each in figure.data[::4]] == ["0 %", "40 %", "100 %"]
+    assert len(figure.data[0].x) == 3  # sections alone
+    times = own.steps["time"].unique().sort()
+    columns: dict[str, tables.Values] = dict.fromkeys(tables.SCHEMAS["contour"].names)
+    columns |= {
+        "time": times.repeat_by(50).explode(),
+        "t_s": own.steps["t_s"].unique().sort().repeat_by(50).explode(),
+    }
+    columns |= {"s_m": np.tile(np.linspace(60.0, 110.0, 50), 3), "status": ["ok"] * 150}
+    columns |= {f"{axis}_m": np.zeros(150) for axis in "xyz"}
+    own.contour = tables.build("contour", columns)
+    assert len(Plots(own).deflected_shapes().data[0].x) == 50
+
+
+def test_health_shows_loss_in_percent_of_what_was_due() -> None:
+    figure = Plots(result()).health()
+    lost = trace(figure, "L2")
+    assert max(lost.y) == pytest.approx(100.0 * 75 / 754)
+    assert figure.layout.yaxis2.title.text == "points (1/s)"
+
+
+def test_the_plan_shows_lidars_and_anchors_where_they_are_known() -> None:
+    config = {
+        "lidars": [{"id": "L1", "position_m": [3.0, -6.8, 86.0]}, {"id": "L2"}],
+        "wires": [{"name": "W84", "anchor_m": [42.0, -7.1, 84.0]}],
+    }
+    figure = Plots(result(config=config)).plan()
+    assert (list(trace(figure, "lidar").x), list(trace(figure, "lidar").y)) == ([86.0], [3.0])
+    assert list(trace(figure, "wire anchor").text) == ["W84"]
+
+
+DRAWN = ("time_series", "load_deflection", "deflected_shapes", "plan", "comparison", "health")
+
+
+@pytest.mark.parametrize("name", DRAWN)
+@pytest.mark.parametrize(
+    "frame",
+    [
+        folders.deflection(folders.TIP, load=False),
+        folders.deflection(folders.TIP, overhead_s=(0.0, 19.0)),
+        folders.deflection(folders.TIP).head(1),
+    ],
+    ids=["no load", "nearly nothing measured", "one state"],
+)
+def test_every_figure_is_drawn_for_poor_results(name: str, frame: pl.DataFrame) -> None:
+    poor = Result(frame, folders.step_table(frame), tables.empty("health"))
+    figure = getattr(Plots(poor), name)()
+    assert figure.to_json()
+    for axis in [*figure.select_xaxes(), *figure.select_yaxes()]:
+        assert axis.visible is False or axis.title.text is not None or axis.matches is not None
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_hostile_names_stay_text(name: str) -> None:
+    bad = "<script>alert(1)</script>"
+    frame = folders.deflection({bad: (84.0, 3.0, 0.1, 0.0)})
+    own = result(
+        frame, comparison=compared((bad, bad, "total", 1.0, 2.0)), health=folders.health([bad])
+    )
+    own.config = {"lidars": [{"id": bad, "position_m": [0, 0, 0]}]}
+    assert "<script" not in getattr(Plots(own), name)().to_json()
+
+
+def test_the_palette_keeps_its_distance_and_changes_dash_when_it_starts_again() -> None:
+    assert len({(style.colour(k), style.dash(k)) for k in range(16)}) == 16
+    assert style.translucent("#0072B2", 0.5) == "rgba(0,114,178,0.5)"
+    assert style.stretches([True, True, False, True]) == [(0, 1), (3, 3)]
