@@ -14,8 +14,8 @@ __all__ = [
     "Sweep",
     "SweepIterator",
     "__version__",
-    "reference_blades",
     "check_captures",
+    "reference_blades",
     "scan_capture",
     "sensor_models",
 ]
