@@ -2,7 +2,7 @@
 
 mod columns;
 mod describe;
-mod feed;
+pub mod feed;
 mod sweeps;
 
 use std::path::PathBuf;

@@ -50,7 +50,7 @@ fn yaw_from_wall<'py>(
     let normal = arrays::direction("normal", &normal)?;
     let expected = ExpectedWall { normal, distance_m, yaw_range_rad, min_height_m };
     let found = compute(py, Some(1), || wall::yaw_from_wall(points, &expected))??;
-    Ok((found.yaw_rad, found.plane.rms_m, found.plane.count))
+    Ok((found.yaw_rad, found.plane.rms, found.plane.count))
 }
 
 fn matrix<'py>(

@@ -10,6 +10,8 @@ use crate::cluster::dbscan::{DbscanParams, dbscan};
 use crate::cluster::NOISE;
 use crate::cluster::line::{LineParams, line_clusters};
 use crate::cluster::radius::{Intervals, RadiusModel};
+use crate::fit::Fit;
+use crate::fit::polynomial::Polynomial;
 use crate::time::Timestamp;
 
 /// How step 6 chooses its radius by equation (10).
@@ -74,6 +76,17 @@ pub struct Contours {
     pub leading: ContourCurve,
     /// Trailing edge.
     pub trailing: ContourCurve,
+}
+
+impl Contours {
+    /// Leading minus trailing edge at `z_m`, metres; nothing along z by construction.
+    pub fn chord_m(&self, z_m: f64) -> [f64; 3] {
+        let across = |a: &Fit<Polynomial>, b: &Fit<Polynomial>| {
+            a.estimate.value(z_m) - b.estimate.value(z_m)
+        };
+        let (a, b) = (&self.leading, &self.trailing);
+        [across(&a.x, &b.x), across(&a.y, &b.y), 0.0]
+    }
 }
 
 /// A contour cluster that did not agree with the others (step 8).
@@ -224,19 +237,20 @@ fn agreeing_samples(
         return Vec::new();
     };
     let Ok(labels) = dbscan(&samples, &clustering) else { return Vec::new() };
-    let agreed = line_clusters(&samples, &labels, &params.line);
-    rejected.extend(noise(&samples, &labels));
-    rejected.extend(agreed.rejected.iter().map(|cluster| Rejected {
-        centre_m: cluster.centre_m,
+    let Ok(judged) = line_clusters(&samples, labels.as_slice(), &params.line) else {
+        return Vec::new(); // all samples are noise
+    };
+    rejected.extend(noise(&samples, labels.as_slice()));
+    rejected.extend(judged.left().map(|cluster| Rejected {
+        centre_m: cluster.center_m,
         count: cluster.count as u32,
         reason: "off_the_line",
     }));
-    let kept = |index: &usize| agreed.kept.contains(&labels[*index]);
-    (0..samples.len()).filter(kept).map(|index| samples[index]).collect()
+    samples.into_iter().zip(judged.keep).filter(|(_, keep)| *keep).map(|(p, _)| p).collect()
 }
 
 fn noise<'a>(samples: &'a [[f64; 3]], labels: &'a [i32]) -> impl Iterator<Item = Rejected> + 'a {
-    let alone = samples.iter().zip(labels).filter(|(_, label)| **label < 0);
+    let alone = samples.iter().zip(labels).filter(|(_, label)| **label == NOISE);
     alone.map(|(sample, _)| Rejected { centre_m: *sample, count: 1, reason: "alone" })
 }
 

@@ -172,7 +172,7 @@ impl ContourSeries {
     pub fn arc_to_tip_m(&self, plane: Plane, z_m: &[f64]) -> Vec<f64> {
         self.at_each(z_m, f64::NAN, |frame, z| {
             let tip = frame.tip(plane).ok()?;
-            Some(mid_line(frame)?.length_m(z, tip.z_m))
+            mid_line(frame)?.length_m(z, tip.z_m)
         })
     }
 
@@ -180,7 +180,7 @@ impl ContourSeries {
     pub fn sections_m(&self, plane: Plane, to_tip_m: &[f64]) -> Vec<[f64; 3]> {
         self.at_each(to_tip_m, [f64::NAN; 3], |frame, length| {
             let tip = frame.tip(plane).ok()?;
-            Some(mid_line(frame)?.before_tip_m(tip.z_m, length))
+            mid_line(frame)?.before_tip_m(tip.z_m, length)
         })
     }
 
@@ -191,7 +191,7 @@ impl ContourSeries {
 
     /// Leading minus trailing edge at each z, metres; frame by frame, NaN without contours.
     pub fn chords_at_m(&self, z_m: &[f64]) -> Vec<[f64; 3]> {
-        self.at_each(z_m, [f64::NAN; 3], |frame, z| Some(mid_line(frame)?.chord_m(z)))
+        self.at_each(z_m, [f64::NAN; 3], |frame, z| Some(frame.contours.as_ref()?.chord_m(z)))
     }
 
     /// What became of each lidar's share, frame by frame.
@@ -213,8 +213,8 @@ impl ContourSeries {
     }
 }
 
-fn mid_line(frame: &FrameContours) -> Option<MidLine<'_>> {
-    frame.contours.as_ref().map(|both| MidLine::new(&both.leading, &both.trailing))
+fn mid_line(frame: &FrameContours) -> Option<MidLine> {
+    frame.contours.as_ref().and_then(|both| MidLine::new(&both.leading, &both.trailing))
 }
 
 fn sample(frame: &Frame, params: &FrameParams, sampling: Sampling) -> Vec<BladePoints> {

@@ -83,7 +83,7 @@ pub fn intersect(
     let (a, b) = (on_plane(leading, plane), on_plane(trailing, plane));
     let end = leading.seen_z_m[1].max(trailing.seen_z_m[1]);
     let length = end - leading.seen_z_m[0].min(trailing.seen_z_m[0]);
-    let gap = |z: f64| a.estimate.eval(z) - b.estimate.eval(z);
+    let gap = |z: f64| a.estimate.value(z) - b.estimate.value(z);
     let z_m = first_root(gap, end - BEFORE_END * length, end + length).ok_or(NoTip::NoIntersection)?;
     let slope = (a.estimate.slope(z_m) - b.estimate.slope(z_m)).abs();
     let u_z_m = (a.variance_at(z_m) + b.variance_at(z_m)).sqrt() / slope;

@@ -1,10 +1,11 @@
 //! Yaw from a surveyed wall: a ground normal leaves the turn about the vertical free.
 
-use nalgebra::{Point3, Rotation3, Unit, Vector3};
+use nalgebra::{Rotation3, Unit, Vector3};
 use thiserror::Error;
 
 use crate::error::Coded;
-use crate::fit::plane::{PlaneFit, fit_plane};
+use crate::fit::Fit;
+use crate::fit::plane::{Plane, fit_plane};
 
 /// Step of the search over yaw, radians: at 30 m a third of [`BAND_M`].
 const STEP_RAD: f64 = 0.0017;
@@ -32,7 +33,7 @@ pub struct WallYaw {
     /// Turn about world up, radians, to be applied after levelling.
     pub yaw_rad: f64,
     /// Plane through the wall's points before that turn, origin at the sensor.
-    pub plane: PlaneFit,
+    pub plane: Fit<Plane>,
 }
 
 /// Why no yaw came out.
@@ -91,7 +92,7 @@ pub fn yaw_from_wall(levelled: &[[f32; 3]], wall: &ExpectedWall) -> Result<WallY
         return Err(refuse());
     }
     let inliers: Vec<[f64; 3]> = voters(&candidates, wall, best.1).map(|p| (*p).into()).collect();
-    let plane = fit_plane(&inliers, &Point3::origin()).map_err(|_| refuse())?;
+    let plane = fit_plane(&inliers, &Vector3::zeros()).map_err(|_| refuse())?;
     Ok(WallYaw { yaw_rad: yaw_between(&plane.estimate.normal, wall), plane })
 }
 
@@ -107,7 +108,7 @@ fn voters<'a>(
 }
 
 /// Turn about world up from the seen normal (towards the sensor) to the surveyed one.
-fn yaw_between(seen: &Unit<Vector3<f64>>, wall: &ExpectedWall) -> f64 {
+fn yaw_between(seen: &Vector3<f64>, wall: &ExpectedWall) -> f64 {
     let towards_sensor = if wall.distance_m > 0.0 { -*wall.normal } else { *wall.normal };
     let heading = |v: &Vector3<f64>| v.x.atan2(v.z);
     crate::angle::wrap_half_turn(heading(&towards_sensor) - heading(seen))
