@@ -131,7 +131,10 @@ impl SweepCutter {
         let lost_behind_cut = self.add_lost(packet, start_rad);
         let first_turn = turn_of(start_rad);
         let gap = self.end.filter(|_| packet.lost > 0);
-        let gap = gap.map(|end| Gap { from: end.time, to: packet.time });
+        let gap = gap.map(|end| Gap {
+            from: end.time,
+            to: packet.time,
+        });
         if self.open.as_ref().is_none_or(|open| open.turn < first_turn) {
             // A gap over the cut belongs to the sweeps on both sides.
             self.add_gap(gap);
