@@ -170,6 +170,7 @@ def yaw_from_wall(
     yaw_range_rad: float,
     min_height_m: float,
 ) -> tuple[float, float, int]: ...
+
 @final
 class FramePlan:
     def __new__(
