@@ -34,8 +34,9 @@ def cloud(name: str, values: ArrayLike) -> Cloud:
     array = _real(name, values)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InvalidValueError(f"{name}: expected shape (n, 3), found shape {array.shape}")
-    dtype = np.float32 if array.dtype == np.float32 else np.float64
-    return np.ascontiguousarray(array, dtype=dtype)
+    if array.dtype == np.float32:
+        return np.ascontiguousarray(array, dtype=np.float32)
+    return np.ascontiguousarray(array, dtype=np.float64)
 
 
 def column(name: str, values: ArrayLike, length: int | None = None) -> NDArray[np.float64]:
