@@ -1,6 +1,7 @@
 """The compiled core; private. Its public face are the modules of this package."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from os import PathLike
 from pathlib import Path
 from typing import Any, final
 
@@ -9,14 +10,23 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CaptureScan",
+    "ContourPass",
+    "DistancePass",
+    "FrameParams",
+    "FramePlan",
     "PointIterator",
+    "Simulation",
     "Sweep",
     "SweepIterator",
     "__version__",
     "check_captures",
     "cut_capture",
+    "reference_blades",
+    "rotation_about_up",
+    "rotation_onto",
     "scan_capture",
     "sensor_models",
+    "yaw_from_wall",
 ]
 
 __version__: str
@@ -124,3 +134,118 @@ class SweepIterator(Iterator[Sweep]):
     def __next__(self) -> Sweep: ...
     @property
     def merged(self) -> int: ...
+
+def reference_blades() -> list[str]: ...
+
+@final
+class Simulation:
+    """A simulated test under way; writes its capture as it goes."""
+
+    def __new__(cls, scene: Mapping[str, Any]) -> Simulation: ...
+    @property
+    def duration_s(self) -> float: ...
+    @property
+    def done_s(self) -> float: ...
+    def create(self, path: str | PathLike[str]) -> None: ...
+    def advance(self, *, threads: int | None) -> bool: ...
+    def packets(self) -> list[tuple[int, int]]: ...
+    def poses(self) -> list[list[list[float]]]: ...
+    def truth(
+        self, sections_m: Sequence[float], times_s: NDArray[np.float64], *, threads: int | None
+    ) -> NDArray[np.float64]: ...
+    def load(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def ground_m(self, places: Sequence[tuple[float, float]]) -> list[float]: ...
+    def nominal(self) -> dict[str, NDArray[np.float64]]: ...
+    def contours(self) -> NDArray[np.float64]: ...
+
+def rotation_onto(
+    from_direction: NDArray[np.float64], to_direction: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def rotation_about_up(yaw_rad: float) -> NDArray[np.float64]: ...
+def yaw_from_wall(
+    levelled: NDArray[np.float32],
+    *,
+    normal: NDArray[np.float64],
+    distance_m: float,
+    yaw_range_rad: float,
+    min_height_m: float,
+) -> tuple[float, float, int]: ...
+
+@final
+class FramePlan:
+    def __new__(
+        cls,
+        scan: CaptureScan,
+        *,
+        lidars: Sequence[int],
+        poses: NDArray[np.float64],
+        cut_azimuth_deg: Sequence[float],
+        box_m: NDArray[np.float64],
+        first_ns: int,
+        period_ns: int,
+        start_ns: int,
+        stop_ns: int,
+    ) -> FramePlan: ...
+
+@final
+class FrameParams:
+    def __new__(
+        cls,
+        *,
+        distances_m: NDArray[np.float64] | None,
+        intervals: int,
+        alpha_deg: float,
+        mu: float,
+        beta_m: float,
+        min_points: int,
+        strict: bool,
+        leading_edge: NDArray[np.float64],
+        contour_radius_m: float,
+        contour_min_points: int,
+        line_degree: int,
+        line_distance_m: float,
+        degree_yoz: int,
+        degree_xoz: int,
+        tip_max_u_m: float,
+        overhead_m: float | None,
+    ) -> FrameParams: ...
+
+@final
+class DistancePass:
+    def __new__(cls, plan: FramePlan) -> DistancePass: ...
+    def advance(
+        self,
+        count: int,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> bool: ...
+    def ranges_m(self) -> NDArray[np.float64]: ...
+
+@final
+class ContourPass:
+    def __new__(
+        cls, plan: FramePlan, params: FrameParams, *, sample_every: int, sample_points: int
+    ) -> ContourPass: ...
+    def advance(
+        self,
+        count: int,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> bool: ...
+    def time_ns(self) -> NDArray[np.int64]: ...
+    def uses(
+        self,
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.bool_], NDArray[np.uint32]]: ...
+    def failures(self, plane: str) -> list[str | None]: ...
+    def seen_z_m(self) -> NDArray[np.float64]: ...
+    def tip_z_m(self, plane: str) -> NDArray[np.float64]: ...
+    def arc_to_tip_m(self, plane: str, z_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def sections_m(self, plane: str, to_tip_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def points_at_m(self, z_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def chords_at_m(self, z_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def sampled_points(
+        self,
+    ) -> tuple[NDArray[np.int64], NDArray[np.uint32], NDArray[np.uint32], NDArray[np.float32]]: ...
+    def rejected(
+        self,
+    ) -> tuple[NDArray[np.int64], list[str], NDArray[np.uint32], NDArray[np.float64]]: ...

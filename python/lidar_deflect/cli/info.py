@@ -1,6 +1,6 @@
 """``lidar-deflect info``: what a capture holds."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any
 
 import typer
@@ -50,78 +50,78 @@ def describe(document: Mapping[str, Any]) -> str:
 
 
 def _captures(document: Mapping[str, Any]) -> str:
-    lines = [_capture(entry) for entry in document.get("captures", ())]
-    return "\n".join(lines)
+    return "\n".join(line for entry in document["captures"] for line in _capture(entry))
 
 
-def _capture(entry: Any) -> str:
-    if not isinstance(entry, Mapping):
-        return str(entry)
-    name = entry.get("path") or entry.get("name") or "capture"
-    numbers = [f"{grouped(value)} {key}" for key, value in entry.items() if _is_count(value)]
-    return f"{name}: " + ", ".join(numbers)
-
-
-def _is_count(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+def _capture(entry: Mapping[str, Any]) -> Iterator[str]:
+    size_mb = entry["size_bytes"] / 1e6
+    kind, count = entry["format"], grouped(entry["records"])
+    yield f"{entry['path']}: {kind}, {size_mb:.1f} MB, {count} records"
+    yield from (f"  warning: {text}" for text in entry["warnings"])
 
 
 def _streams(document: Mapping[str, Any]) -> str:
-    header = ["source", "port", "model", "return", "rpm", *COUNTS, "from", "seconds", "clock"]
-    return table(header, [_stream(stream) for stream in document.get("streams", ())])
+    header = [
+        "source",
+        "port",
+        "model",
+        "return",
+        "rpm",
+        *COUNTS,
+        "first (UTC)",
+        "seconds",
+        "clock",
+    ]
+    return table(header, [_stream(stream) for stream in document["streams"]])
 
 
 def _stream(stream: Mapping[str, Any]) -> list[str]:
-    first, last = stream.get("first_utc"), stream.get("last_utc")
     return [
-        _said(stream.get("source")),
-        _said(stream.get("port")),
-        _said(stream.get("model")),
-        _said(stream.get("return_mode")),
-        _rounded(stream.get("rpm")),
-        *(grouped(stream[key]) if stream.get(key) is not None else "-" for key in COUNTS),
-        _said(first)[:19],
-        _seconds(first, last),
-        _said(stream.get("clock")),
+        stream["source"],
+        str(stream["port"]),
+        stream["model"],
+        stream["return_mode"],
+        f"{stream['rpm']:.0f}",
+        *(grouped(stream[key]) for key in COUNTS),
+        stream["first_utc"][:19],
+        f"{_seconds(stream['first_utc'], stream['last_utc']):.1f}",
+        _clock(stream["clock"]),
     ]
 
 
-def _said(value: Any) -> str:
-    if value in (None, "", [], ()):
-        return "-"
-    if isinstance(value, Mapping):
-        return ", ".join(f"{key} {_said(inner)}" for key, inner in value.items())
-    return f"{value:.3f}" if isinstance(value, float) else str(value)
+def _clock(clock: Mapping[str, Any]) -> str:
+    """Say what the device clock is worth: locked, agreeing with the host, or free running."""
+    text = f"{clock['kind']}, offset {clock['offset_s']:.3f} s, drift {clock['drift_ppm']:.1f} ppm"
+    return text.replace("_", " ") + (f", {clock['jumps']} jumps" if clock["jumps"] else "")
 
 
-def _rounded(value: Any) -> str:
-    return "-" if value is None else f"{value:.0f}"
-
-
-def _seconds(first: Any, last: Any) -> str:
-    if not (isinstance(first, str) and isinstance(last, str)):
-        return "-"
-    return f"{(_ns(last) - _ns(first)) / 1e9:.1f}"
-
-
-def _ns(text: str) -> int:
+def _seconds(first: str, last: str) -> float:
     import numpy as np
 
-    return int(np.datetime64(text.removesuffix("Z").removesuffix("+00:00"), "ns").astype("int64"))
+    start, stop = (np.datetime64(text.removesuffix("Z"), "ns") for text in (first, last))
+    return float((stop - start) / np.timedelta64(1, "s"))
 
 
 def _notes(document: Mapping[str, Any]) -> str:
-    lines = []
-    for stream in document.get("streams", ()):
-        name = f"{_said(stream.get('source'))}:{_said(stream.get('port'))}"
-        if stream.get("candidates"):
-            lines.append(f"{name}: could also be {', '.join(stream['candidates'])}")
-        if stream.get("beams"):
-            lines.append(f"{name}: beams {_said(stream['beams'])}")
-        lines += [f"{name}: {note}" for note in stream.get("notes") or ()]
-    return "\n".join(lines)
+    """List remarks, each once with the streams that it holds for."""
+    remarks: dict[str, list[str]] = {}
+    for stream in document["streams"]:
+        for remark in _remarks(stream):
+            remarks.setdefault(remark, []).append(stream["source"])
+    for start, stop in document.get("pauses", ()):
+        remarks.setdefault(f"nothing was recorded from {start} to {stop}", [])
+    return "\n".join(
+        ": ".join([", ".join(who), what] if who else [what]) for what, who in remarks.items()
+    )
+
+
+def _remarks(stream: Mapping[str, Any]) -> Iterator[str]:
+    if stream["candidates"]:
+        yield f"{stream['model']} could also be {', '.join(stream['candidates'])}"
+    yield f"beams: {stream['beams']}"
+    yield from stream["notes"]
 
 
 def _drops(document: Mapping[str, Any]) -> str:
-    rows = [[grouped(drop["count"]), drop["reason"]] for drop in document.get("drops", ())]
+    rows = [[grouped(drop["count"]), drop["reason"]] for drop in document["drops"]]
     return table(["dropped", "reason"], rows) if rows else ""

@@ -94,3 +94,121 @@ impl Coded for CaptureError {
         Some(hint.into())
     }
 }
+
+/// A point cloud that cannot be searched or clustered.
+#[derive(Debug, Clone, Error, PartialEq)]
+pub enum ClusterError {
+    /// A coordinate is NaN or infinite.
+    #[error("point {index}: expected finite coordinates, found {point:?}")]
+    NotFinite {
+        /// Place of the first such point.
+        index: usize,
+        /// Its coordinates.
+        point: [f64; 3],
+    },
+    /// More points than labels can number.
+    #[error("points: expected at most {most}, found {found}")]
+    TooMany {
+        /// What 32-bit labels allow.
+        most: usize,
+        /// Number of points.
+        found: usize,
+    },
+    /// One radius per point, or one label per sample, was announced, but the lengths differ.
+    #[error("{name}: expected {expected} values, one per point, found {found}")]
+    Length {
+        /// What there should be one of for every point.
+        name: &'static str,
+        /// Number of points.
+        expected: usize,
+        /// Number of values.
+        found: usize,
+    },
+}
+
+impl Coded for ClusterError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } => "cluster.not_finite",
+            Self::TooMany { .. } => "cluster.too_many_points",
+            Self::Length { .. } => "cluster.length",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::NotFinite { .. } => Some("leave out NaN and infinite points first".into()),
+            Self::TooMany { .. } => Some("cluster sweep by sweep".into()),
+            Self::Length { .. } => None,
+        }
+    }
+}
+
+/// A shape that the points do not fix.
+#[derive(Debug, Clone, Error, PartialEq)]
+pub enum FitError {
+    /// Fewer points than unknowns.
+    #[error("{shape}: expected at least {needed} points, found {found}")]
+    TooFew {
+        /// What was to be fitted.
+        shape: &'static str,
+        /// Least number of points.
+        needed: usize,
+        /// Number of points.
+        found: usize,
+    },
+    /// Enough points, but lying so that more than one shape fits them equally well.
+    #[error("{shape}: {reason}")]
+    Degenerate {
+        /// What was to be fitted.
+        shape: &'static str,
+        /// How the points lie.
+        reason: String,
+    },
+    /// A coordinate is NaN or infinite.
+    #[error("{shape}: point {index} has a coordinate that is not finite")]
+    NotFinite {
+        /// What was to be fitted.
+        shape: &'static str,
+        /// Place of the first such point.
+        index: usize,
+    },
+    /// A search did not reach its tolerance.
+    #[error("{what}: no convergence to {tolerance:e} within {steps} steps")]
+    NotConverged {
+        /// What was searched.
+        what: &'static str,
+        /// Wanted tolerance, in the unit of the result.
+        tolerance: f64,
+        /// Steps allowed.
+        steps: usize,
+    },
+    /// A line clustering without any cluster: all samples are noise.
+    #[error("line clustering: all {samples} samples are noise")]
+    NoCluster {
+        /// Number of samples.
+        samples: usize,
+    },
+}
+
+impl Coded for FitError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::TooFew { .. } => "fit.too_few",
+            Self::Degenerate { .. } => "fit.degenerate",
+            Self::NotFinite { .. } => "fit.not_finite",
+            Self::NotConverged { .. } => "fit.not_converged",
+            Self::NoCluster { .. } => "fit.no_cluster",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::TooFew { .. } => Some("take more points or a lower degree".into()),
+            Self::Degenerate { .. } => Some("take points that spread wider".into()),
+            Self::NotFinite { .. } => Some("leave out NaN and infinite points first".into()),
+            Self::NotConverged { .. } => Some("a larger tolerance or a shorter stretch".into()),
+            Self::NoCluster { .. } => Some("a larger clustering radius or fewer points".into()),
+        }
+    }
+}

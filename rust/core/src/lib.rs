@@ -18,4 +18,13 @@ pub mod packet;
 pub mod stream;
 pub mod sweep;
 
+pub mod fit;
+pub mod neighbors;
+
+pub mod cluster;
+pub mod register;
+
+pub mod blade;
+pub mod paper;
+
 pub mod synthetic;

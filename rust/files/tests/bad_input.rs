@@ -3,7 +3,7 @@
 mod support;
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use lidar_deflect_core::error::Coded;
 use lidar_deflect_files::{CaptureSet, FileError};
@@ -17,8 +17,8 @@ fn refuse(paths: &[PathBuf]) -> FileError {
 }
 
 /// Code and words of the message, and that there is a hint and the path.
-fn expect(path: PathBuf, code: &str, words: &str) {
-    let error = refuse(std::slice::from_ref(&path));
+fn expect(path: &Path, code: &str, words: &str) {
+    let error = refuse(&[path.into()]);
     assert_eq!(error.code(), code, "{error}");
     assert!(error.to_string().contains(words), "{error}");
     assert!(
@@ -95,7 +95,7 @@ fn files_of_other_kinds_are_named() {
         ),
     ];
     for (name, bytes, code, words) in cases {
-        expect(write(&folder, name, bytes), code, words);
+        expect(&write(&folder, name, bytes), code, words);
     }
 }
 
@@ -104,29 +104,29 @@ fn compressed_files_of_other_kinds_are_told_by_their_first_bytes() {
     let folder = folder("compressed_kinds");
     let table = gzip(b"time,x,y\n");
     expect(
-        write(&folder, "table.csv.gz", &table),
+        &write(&folder, "table.csv.gz", &table),
         "capture.unknown_format",
         "found 74 69 6D 65",
     );
     expect(
-        write(&folder, "empty.gz", &gzip(b"")),
+        &write(&folder, "empty.gz", &gzip(b"")),
         "capture.unknown_format",
         "found nothing",
     );
     expect(
-        write(&folder, "empty.zst", &zstd(b"")),
+        &write(&folder, "empty.zst", &zstd(b"")),
         "capture.unknown_format",
         "found nothing",
     );
     expect(
-        write(&folder, "cut.gz", &table[..5]),
+        &write(&folder, "cut.gz", &table[..5]),
         "capture.unknown_format",
         "found nothing",
     );
     let mut broken = gzip(&pcap(1, 0..1000));
     broken[12..40].fill(0xFF);
     expect(
-        write(&folder, "broken.gz", &broken),
+        &write(&folder, "broken.gz", &broken),
         "capture.read",
         "cannot be read",
     );
@@ -136,18 +136,18 @@ fn compressed_files_of_other_kinds_are_told_by_their_first_bytes() {
 fn paths_that_lead_to_no_file() {
     let folder = folder("paths");
     expect(
-        folder.join("nowhere.pcap"),
+        &folder.join("nowhere.pcap"),
         "capture.not_found",
         "no such file",
     );
     expect(
-        folder.join("nowhere").join("run.pcap"),
+        &folder.join("nowhere").join("run.pcap"),
         "capture.not_found",
         "no such file",
     );
-    expect(folder.clone(), "capture.directory", "found a directory");
+    expect(&folder, "capture.directory", "found a directory");
     let file = write(&folder, "run.pcap", &pcap(1, [0]));
-    expect(file.join("below"), "capture.not_found", "no such file");
+    expect(&file.join("below"), "capture.not_found", "no such file");
     assert!(refuse(&[folder.join("nowhere.pcap")]).is_not_found());
     assert_eq!(refuse(&[]).code(), "capture.none_given");
 }
@@ -179,7 +179,7 @@ fn a_file_that_may_not_be_read() {
     if fs::read(&path).is_ok() {
         return println!("skipped: the user of this test may read everything");
     }
-    expect(path, "capture.unreadable", "cannot be read");
+    expect(&path, "capture.unreadable", "cannot be read");
 }
 
 /// Every prefix of compressed captures ends or is refused, and never loses what is whole.

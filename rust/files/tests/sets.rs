@@ -188,3 +188,32 @@ fn garbage_in_one_file_is_told_once_and_the_others_go_on() {
     assert!(error.contains("broken.pcap: record 2 (byte 158"), "{error}");
     assert_eq!(read(&mut set).unwrap(), [(2, 3), (2, 5)]);
 }
+
+/// A day of rotated files must not need as many open files, nor a buffer for each.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_rotated_set_holds_one_file_open_at_a_time() {
+    let folder = folder("lazy");
+    let paths: Vec<PathBuf> = (0..40i64)
+        .map(|n| write(&folder, &format!("{n}"), &pcap(1, [2 * n, 2 * n + 1])))
+        .collect();
+    let open_files = || {
+        let links = std::fs::read_dir("/proc/self/fd").unwrap().flatten();
+        let targets = links.filter_map(|link| std::fs::read_link(link.path()).ok());
+        targets.filter(|target| target.starts_with(&folder)).count()
+    };
+    let mut set = CaptureSet::open(&paths).unwrap();
+    assert_eq!(open_files(), 0);
+    let mut count = 0;
+    while set.next().unwrap().is_some() {
+        assert_eq!(open_files(), 1);
+        count += 1;
+    }
+    assert_eq!((count, open_files()), (80, 0));
+}
+
+#[test]
+fn a_set_can_be_read_on_another_thread() {
+    fn is_send<T: Send>() {}
+    is_send::<CaptureSet>();
+}

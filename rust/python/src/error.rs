@@ -1,6 +1,7 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
 use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue};
+use lidar_deflect_core::register::wall::WallError;
 use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -45,6 +46,7 @@ macro_rules! translate {
 translate! {
     CaptureError => "CaptureError",
     InvalidValue => "InvalidValueError",
+    WallError => "CalibrationError",
 }
 
 /// A missing file is also Python's own `FileNotFoundError`.

@@ -3,13 +3,13 @@
 //! A binding function borrows, computes without the interpreter lock, and hands over; it holds no
 //! loop over points and no formula.
 
-// The first binding functions use them.
-#[allow(dead_code)]
 mod arrays;
 mod capture;
-#[allow(dead_code)]
 mod compute;
 mod error;
+mod paper;
+mod register;
+mod synthetic;
 
 use pyo3::prelude::*;
 
@@ -17,5 +17,8 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     capture::register(module)?;
+    paper::register(module)?;
+    register::register(module)?;
+    synthetic::register(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -5,8 +5,9 @@ use std::net::{IpAddr, SocketAddr};
 use super::assembly::Added;
 use super::facts::FragmentFacts;
 use super::fragments::{FragmentPool, Key};
-use super::ip::{self, Fragment, IpPacket, UDP, UDP_HEADER_LEN};
+use super::ip::{self, Fragment, IpPacket};
 use super::link;
+use super::udp::{self, UDP};
 use super::{Datagram, Record};
 use crate::drops::Drops;
 
@@ -106,7 +107,7 @@ impl Assembler {
         }
         let start = link.len + packet.body.start;
         let segment = &data[packet.body.clone()];
-        udp(&packet, packet.protocol, segment, Place::Record(start)).map(Some)
+        in_segment(&packet, packet.protocol, segment, Place::Record(start)).map(Some)
     }
 
     /// Adds a fragment to the pool.
@@ -144,14 +145,14 @@ impl Assembler {
     fn completed(&self, packet: &IpPacket) -> Result<Found, &'static str> {
         let (whole, protocol) = self.pool.completed();
         if packet.source.is_ipv4() {
-            return udp(packet, protocol, whole, Place::Pool(0));
+            return in_segment(packet, protocol, whole, Place::Pool(0));
         }
         let chain = ip::skip_extensions(protocol, whole)?;
         if chain.fragment.is_some() {
             return Err("damaged_headers"); // a fragment within a fragment
         }
         let place = Place::Pool(chain.len);
-        udp(packet, chain.protocol, &whole[chain.len..], place)
+        in_segment(packet, chain.protocol, &whole[chain.len..], place)
     }
 
     fn tell_incomplete(&mut self) {
@@ -164,7 +165,7 @@ impl Assembler {
 
 /// Reads the UDP header of `segment`, which stands at `place`.
 #[inline]
-fn udp(
+fn in_segment(
     packet: &IpPacket,
     protocol: u8,
     segment: &[u8],
@@ -173,14 +174,14 @@ fn udp(
     if protocol != UDP {
         return Err("not_udp");
     }
-    let header = ip::parse_udp(segment)?;
+    let header = udp::parse(segment)?;
     let socket = |address: IpAddr, port| SocketAddr::new(address, port);
     Ok(Found {
         source: socket(packet.source, header.source_port),
         destination: socket(packet.destination, header.destination_port),
         place: match place {
-            Place::Record(start) => Place::Record(start + UDP_HEADER_LEN),
-            Place::Pool(start) => Place::Pool(start + UDP_HEADER_LEN),
+            Place::Record(start) => Place::Record(start + udp::HEADER_LEN),
+            Place::Pool(start) => Place::Pool(start + udp::HEADER_LEN),
         },
         len: header.payload_len,
     })

@@ -5,7 +5,7 @@ use std::io;
 use std::net::{IpAddr, SocketAddr};
 use std::ops::Range;
 
-use super::ip::{UDP, UDP_HEADER_LEN};
+use super::udp::{HEADER_LEN as UDP_HEADER_LEN, UDP};
 use super::writer::{MTU, invalid, same_version};
 
 const IPV4_LEN: usize = 20;

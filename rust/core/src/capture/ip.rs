@@ -1,6 +1,6 @@
-//! IPv4 and IPv6 headers, extension headers and fragments; UDP headers.
+//! IPv4 and IPv6 headers, extension headers and fragments.
 //!
-//! Source: RFC 791, RFC 8200, RFC 4302 (authentication header), RFC 768. Checksums are not verified:
+//! Source: RFC 791, RFC 8200, RFC 4302 (authentication header). Checksums are not verified:
 //! captures of the sending machine hold wrong ones.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
@@ -8,8 +8,6 @@ use std::ops::Range;
 
 use super::link::Version;
 
-pub(crate) const UDP: u8 = 17;
-pub(crate) const UDP_HEADER_LEN: usize = 8;
 const IPV4_MIN_LEN: usize = 20;
 const IPV6_LEN: usize = 40;
 
@@ -181,38 +179,8 @@ fn v6_fragment(header: &[u8]) -> Option<Fragment> {
     })
 }
 
-/// A UDP header and how much of what follows belongs to it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct UdpHeader {
-    pub source_port: u16,
-    pub destination_port: u16,
-    pub payload_len: usize,
-}
-
-/// Reads the UDP header at the start of `segment`.
-///
-/// # Errors
-/// `damaged_headers`, or `truncated_record` where the length field reaches beyond `segment`.
-#[inline]
-pub(crate) fn parse_udp(segment: &[u8]) -> Result<UdpHeader, &'static str> {
-    let header = segment
-        .first_chunk::<UDP_HEADER_LEN>()
-        .ok_or("damaged_headers")?;
-    let len = match usize::from(u16_at(header, 4)) {
-        0 => segment.len(), // offload, or an IPv6 jumbogram
-        len => len,
-    };
-    if len > segment.len() {
-        return Err("truncated_record");
-    }
-    Ok(UdpHeader {
-        source_port: u16_at(header, 0),
-        destination_port: u16_at(header, 2),
-        payload_len: len.checked_sub(UDP_HEADER_LEN).ok_or("damaged_headers")?,
-    })
-}
-
-fn u16_at(bytes: &[u8], at: usize) -> u16 {
+/// Big endian, as all of the network; the caller has checked the length.
+pub(crate) fn u16_at(bytes: &[u8], at: usize) -> u16 {
     u16::from_be_bytes([bytes[at], bytes[at + 1]])
 }
 
@@ -228,6 +196,7 @@ fn v6_at(header: &[u8; IPV6_LEN], at: usize) -> IpAddr {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::capture::udp::UDP;
 
     /// 10.0.0.1 -> 10.0.0.2, UDP, 8 bytes of body and 2 of padding behind them.
     fn v4() -> Vec<u8> {
@@ -317,20 +286,5 @@ mod tests {
         };
         assert_eq!(packet.fragment, Some(part));
         assert_eq!((packet.protocol, packet.body), (UDP, 48..56));
-    }
-
-    #[test]
-    fn udp_length_against_what_is_there() {
-        let segment = [0x09, 0x40, 0x20, 0x74, 0, 10, 0, 0, 1, 2, 3];
-        let header = parse_udp(&segment).unwrap();
-        assert_eq!((header.source_port, header.destination_port), (2368, 8308));
-        assert_eq!(header.payload_len, 2);
-        assert_eq!(parse_udp(&segment[..9]), Err("truncated_record"));
-        assert_eq!(parse_udp(&segment[..7]), Err("damaged_headers"));
-        let mut offload = segment;
-        offload[5] = 0;
-        assert_eq!(parse_udp(&offload).unwrap().payload_len, 3);
-        offload[5] = 7;
-        assert_eq!(parse_udp(&offload), Err("damaged_headers"));
     }
 }

@@ -20,6 +20,7 @@ mod assembly;
 mod fragments;
 mod ip;
 mod link;
+mod udp;
 
 mod assembler;
 mod reader;

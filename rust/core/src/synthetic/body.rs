@@ -87,7 +87,7 @@ impl Body {
     pub fn new(blade: &Blade, arc_m: &[f64], saddles: Vec<Saddle>) -> Self {
         let skins: Vec<_> = arc_m.iter().map(|s| blade.skin(*s)).collect();
         let reach = |skin: &[Vector2<f64>; CONTOUR_POINTS]| {
-            skin.iter().map(|p| p.norm()).fold(0.0, f64::max)
+            skin.iter().map(Vector2::norm).fold(0.0, f64::max)
         };
         let mut reach_m: Vec<f64> = skins.iter().map(reach).collect();
         for saddle in &saddles {

@@ -7,6 +7,7 @@ use nalgebra::{Rotation3, Vector3};
 use super::random::{Stream, Subject};
 use super::terrain::Ray;
 use crate::angle::wrap_turn;
+use crate::error::InvalidValue;
 use crate::frame::WorldFromSensor;
 use crate::packet::velodyne::{BLOCKS, puck};
 use crate::time::{NANOS_PER_HOUR, Timestamp};
@@ -31,6 +32,25 @@ pub static MODELS: [SensorModel; 1] = [SensorModel {
     ],
     focal_m: 0.041_91,
 }];
+
+/// The model of this name.
+///
+/// # Errors
+/// [`InvalidValue`] for a model that cannot be simulated yet.
+pub fn model(id: &str) -> Result<&'static SensorModel, InvalidValue> {
+    MODELS
+        .iter()
+        .find(|model| model.id == id)
+        .ok_or_else(|| InvalidValue {
+            name: "lidars.model",
+            expected: MODELS
+                .iter()
+                .map(|model| model.id)
+                .collect::<Vec<_>>()
+                .join(", "),
+            found: id.into(),
+        })
+}
 
 /// Device time that a packet spans, ns.
 pub const PACKET_NS: i64 = BLOCKS as i64 * puck::BLOCK_NS;

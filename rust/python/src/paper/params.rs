@@ -2,6 +2,7 @@
 
 use lidar_deflect_core::cluster::line::LineParams;
 use lidar_deflect_core::cluster::radius::{Intervals, RadiusModel};
+use lidar_deflect_core::fit::arc::SpanAxis;
 use lidar_deflect_core::paper::curves::Degrees;
 use lidar_deflect_core::paper::frame::{FrameParams as Core, RadiusRule};
 use lidar_deflect_core::paper::tip::TipLimits;
@@ -45,14 +46,14 @@ impl FrameParams {
         tip_max_u_m: f64,
         overhead_m: Option<f64>,
     ) -> BorderResult<Self> {
-        let model = RadiusModel::new(alpha_deg.to_radians(), mu, beta_m, min_points)?;
         let rule = match &distances_m {
             None => RadiusRule::Continuous,
             Some(ranges) => {
                 let ranges = arrays::pairs("distances_m", ranges)?.iter();
                 let division = |range: &[f64; 2]| {
                     let seen = !range[0].is_nan();
-                    seen.then(|| Intervals::new(range[0], range[1], intervals)).transpose()
+                    seen.then(|| Intervals::new(range[0], range[1], intervals))
+                        .transpose()
                 };
                 RadiusRule::Intervals(ranges.map(division).collect::<Result<_, _>>()?)
             }
@@ -66,7 +67,7 @@ impl FrameParams {
             leading_edge: arrays::direction("leading_edge", &leading_edge)?,
             contour_radius_m: (contour_radius_m > 0.0).then_some(contour_radius_m),
             contour_min_points,
-            line: LineParams::new(line_degree, line_distance_m)?,
+            line: LineParams::new(SpanAxis::Z, [line_degree; 2], line_distance_m)?,
             degrees: Degrees::new(degree_yoz, degree_xoz)?,
             tip: TipLimits::new(tip_max_u_m)?,
             overhead_m,
@@ -77,6 +78,9 @@ impl FrameParams {
 impl FrameParams {
     /// The parameters for lidars at these places, metres, world frame.
     pub fn core(&self, sensors_m: Vec<Point3<f64>>) -> Core {
-        Core { sensors_m, ..self.0.clone() }
+        Core {
+            sensors_m,
+            ..self.0.clone()
+        }
     }
 }
