@@ -155,6 +155,20 @@ pub struct LeftOut {
 }
 
 impl Head {
+    /// The same with the time over a gap from the rotation rate over many packets, which is known
+    /// better than the rate within one.
+    pub fn paced(mut self, mean_rate_rad_per_ns: f64) -> Self {
+        if let Some(gap) = self.left_out
+            && self.rate_rad_per_ns > 0.0
+            && mean_rate_rad_per_ns > 0.0
+        {
+            let longer = 1.0 / mean_rate_rad_per_ns - 1.0 / self.rate_rad_per_ns;
+            let longer_ns = (gap.width_rad * longer) as i64;
+            self.duration_ns = self.duration_ns.saturating_add(longer_ns);
+        }
+        self
+    }
+
     /// Angle that was seen between two angles turned since the first shot.
     pub fn seen_rad(&self, from_rad: f64, to_rad: f64) -> f64 {
         let left_out = self.left_out.map_or(0.0, |gap| {
@@ -214,6 +228,8 @@ pub struct Place {
     pub time: Timestamp,
     /// Number among the data packets of its stream, 0-based.
     pub packet: u32,
+    /// Rotation rate over the packets before; 0 where it is not known.
+    pub mean_rate_rad_per_ns: f64,
 }
 
 /// Returns of one packet, in the order of the shots. The buffer is meant to be used again and again.
@@ -230,12 +246,26 @@ pub struct Decoded {
 }
 
 impl Decoded {
+    /// Number of the first return, from number `from` on, that was shot after the rotor had turned by
+    /// `turned_rad` since the first shot of the packet with this head.
+    pub fn before(&self, from: usize, head: &Head, turned_rad: f64) -> usize {
+        let is_behind = |encoder_rad: &f32| {
+            let since_rad = f64::from(*encoder_rad) - head.azimuth_rad + BACKLASH_RAD;
+            wrap_turn(since_rad) - BACKLASH_RAD >= turned_rad
+        };
+        let behind = self.encoder_rad[from..].iter().position(is_behind);
+        behind.map_or(self.encoder_rad.len(), |place| from + place)
+    }
+
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
         self.returns.clear();
         self.encoder_rad.clear();
     }
 }
+
+/// The encoder may seem to step back by so much.
+const BACKLASH_RAD: f64 = 0.02;
 
 /// Decodes the data packets of one stream; may carry state from packet to packet.
 pub trait Decoder: Send + Sync {
