@@ -1,4 +1,4 @@
-"""The complete simulated tests beside the project, where they are: configuration from their survey."""
+"""The complete simulated tests beside the project: configuration from their survey."""
 
 import json
 from pathlib import Path
@@ -32,20 +32,27 @@ def configuration(name: str, **paper: Any) -> str:
         f'[prediction]\nfile = "{folder}/theory.csv"\nvalue = "deflection_mm_at_100_percent"',
         "[paper]\n" + "\n".join(f"{key} = {value}" for key, value in paper.items()),
     ]
-    for number, lidar in enumerate(survey["lidars"], start=1):
-        axes = ", ".join(f'{axis} = "{to}"' for axis, to in lidar["axes"].items())
-        parts.append(
-            f'[[lidars]]\nid = "L{number}"\nsource = "{lidar["ip"]}"\n'
-            f"position_m = {lidar['position_m']}\nposition_u_m = {sigma}\naxes = {{ {axes} }}"
-        )
-    for point in survey["control_points"]:
-        parts.append(f'[[control]]\non = "{point["on"]}"\nxyz_m = {point["xyz_m"]}\nu_m = {sigma}')
-    for s_m in survey["sections_m"]:
-        parts.append(f'[[sections]]\nname = "S{s_m}"\ns_m = {s_m}')
-    for wire in survey["wires"]:
-        parts.append(
-            f'[[wires]]\nname = "W{wire["section_m"]}"\nsection = "S{wire["section_m"]}"\n'
-            f'anchor_m = {wire["anchor_m"]}\nfile = "{folder}/wire.csv"\n'
-            f'column = "{wire["column"]}"'
-        )
+    parts += [_lidar(number, lidar, sigma) for number, lidar in enumerate(survey["lidars"], 1)]
+    parts += [
+        f'[[control]]\non = "{point["on"]}"\nxyz_m = {point["xyz_m"]}\nu_m = {sigma}'
+        for point in survey["control_points"]
+    ]
+    parts += [f'[[sections]]\nname = "S{s_m}"\ns_m = {s_m}' for s_m in survey["sections_m"]]
+    parts += [_wire(wire, folder) for wire in survey["wires"]]
     return "\n\n".join(parts) + "\n"
+
+
+def _lidar(number: int, lidar: dict[str, Any], sigma: float) -> str:
+    axes = ", ".join(f'{axis} = "{to}"' for axis, to in lidar["axes"].items())
+    return (
+        f'[[lidars]]\nid = "L{number}"\nsource = "{lidar["ip"]}"\n'
+        f"position_m = {lidar['position_m']}\nposition_u_m = {sigma}\naxes = {{ {axes} }}"
+    )
+
+
+def _wire(wire: dict[str, Any], folder: Path) -> str:
+    return (
+        f'[[wires]]\nname = "W{wire["section_m"]}"\nsection = "S{wire["section_m"]}"\n'
+        f'anchor_m = {wire["anchor_m"]}\nfile = "{folder}/wire.csv"\n'
+        f'column = "{wire["column"]}"'
+    )

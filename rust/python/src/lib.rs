@@ -5,8 +5,10 @@
 
 mod arrays;
 mod capture;
+mod cluster;
 mod compute;
 mod error;
+mod fit;
 mod paper;
 mod register;
 mod synthetic;
@@ -17,6 +19,8 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     capture::register(module)?;
+    cluster::register(module)?;
+    fit::register(module)?;
     paper::register(module)?;
     register::register(module)?;
     synthetic::register(module)?;
