@@ -8,9 +8,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from lidar_deflect.clustering import dbscan
 from numpy.typing import NDArray
 from sklearn.cluster import DBSCAN
+
+from lidar_deflect.clustering import dbscan
 
 RADIUS_M = 0.15
 MIN_POINTS = 4
