@@ -9,10 +9,10 @@ from pathlib import Path
 
 import polars as pl
 import pytest
-from scenes import SCENES, configuration, needs_scenes
 
 import lidar_deflect as ld
 from lidar_deflect.result import Result
+from scenes import SCENES, configuration, needs_scenes
 
 pytestmark = needs_scenes
 
