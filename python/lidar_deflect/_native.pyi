@@ -44,6 +44,7 @@ __all__ = [
     "rotation_about_up",
     "rotation_onto",
     "scan_capture",
+    "scan_quickly",
     "sensor_models",
     "walk_arc",
     "yaw_from_wall",
@@ -67,6 +68,9 @@ def scan_capture(
     sensors: Sequence[tuple[str, str]],
     progress: Callable[[int, int], None] | None = None,
 ) -> CaptureScan: ...
+def scan_quickly(
+    paths: Sequence[Path], *, sensors: Sequence[tuple[str, str]], head_s: float
+) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
 def sensor_models() -> list[tuple[str, str]]: ...
 
 @final

@@ -110,7 +110,7 @@ fn a_stream_of_noise_is_survived_and_counted() {
         match random.random_range(0..10) {
             0 => random.fill_bytes(&mut packet.payload[1200..1204]),
             1 => {
-                packet.arrival_ns = i64::from(random.random::<i32>()) << random.random_range(0..32)
+                packet.arrival_ns = i64::from(random.random::<i32>()) << random.random_range(0..32);
             }
             2 => random.fill_bytes(&mut packet.payload[..1200]),
             3 => {

@@ -12,7 +12,7 @@ use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
 use crate::packet::velodyne::position::{Position, Pps};
-use crate::packet::{ModelRef, PacketKind, Tally, closest, companion};
+use crate::packet::{Misfit, ModelRef, PacketKind, Tally, closest, companion};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 
 /// Silence of the whole capture for longer than this is a pause of the recording, not loss.
@@ -57,7 +57,7 @@ struct Stream {
     first: Timestamp,
     last: Timestamp,
     payload_len: usize,
-    closest: Option<(&'static str, String)>,
+    closest: Option<Misfit>,
     position: Option<PositionFacts>,
 }
 
@@ -224,8 +224,7 @@ impl Stream {
                         self.early_foreign.push(datagram.time);
                     }
                     if self.closest.is_none() {
-                        let near = closest(payload);
-                        self.closest = near.map(|(model, why)| (model.id(), why));
+                        self.closest = closest(payload);
                     }
                 }
             }
@@ -286,8 +285,8 @@ impl Stream {
         match &mut self.state {
             State::Lidar(lidar) => lidar.finish(shared),
             State::Probing(probe) => {
-                if let Some((why, model)) = probe.doubt() {
-                    self.closest = Some((model.id(), why));
+                if let Some(why) = probe.doubt() {
+                    self.closest = Some(Misfit { why, may_be: None });
                 }
             }
         }
