@@ -65,7 +65,6 @@ impl CaptureScan {
 /// `sensors` are pairs of a source and a model id; `progress` is called with bytes done and total.
 #[pyfunction]
 #[pyo3(signature = (paths, *, sensors, progress=None))]
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 fn scan_capture(
     py: Python<'_>,
     paths: Vec<PathBuf>,
@@ -106,7 +105,6 @@ fn scan_once(
 
 /// Looks at the first bytes of all files, so that what is no capture is told at once.
 #[pyfunction]
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 fn check_captures(py: Python<'_>, paths: Vec<PathBuf>) -> BorderResult<()> {
     Feed::open(py, &paths).map(|_| ())
 }

@@ -50,7 +50,6 @@ struct PySimulation {
     writer: Option<PcapWriter<BufWriter<File>>>,
 }
 
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 #[pymethods]
 impl PySimulation {
     /// Builds and bends the blade of a scene given as nested dictionaries in SI units.
