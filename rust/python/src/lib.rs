@@ -3,6 +3,9 @@
 //! A binding function borrows, computes without the interpreter lock, and hands over; it holds no
 //! loop over points and no formula.
 
+// Python hands over values, not borrows.
+#![allow(clippy::needless_pass_by_value)]
+
 mod arrays;
 mod capture;
 mod cluster;

@@ -51,7 +51,7 @@ pub trait Model: Sync + std::fmt::Debug {
     fn fits(&self, payload: &[u8]) -> bool;
 
     /// Why `payload`, which fits by its size, was not recognised.
-    fn misfit(&self, payload: &[u8]) -> String;
+    fn misfit(&self, payload: &[u8]) -> Misfit;
 
     /// Times and angles of a data packet without its returns; `None` where the layout is broken.
     fn head(&self, payload: &[u8]) -> Option<Head>;
@@ -155,6 +155,20 @@ pub struct LeftOut {
 }
 
 impl Head {
+    /// The same with the time over a gap from the rotation rate over many packets, which is known
+    /// better than the rate within one.
+    pub fn paced(mut self, mean_rate_rad_per_ns: f64) -> Self {
+        if let Some(gap) = self.left_out
+            && self.rate_rad_per_ns > 0.0
+            && mean_rate_rad_per_ns > 0.0
+        {
+            let longer = 1.0 / mean_rate_rad_per_ns - 1.0 / self.rate_rad_per_ns;
+            let longer_ns = (gap.width_rad * longer) as i64;
+            self.duration_ns = self.duration_ns.saturating_add(longer_ns);
+        }
+        self
+    }
+
     /// Angle that was seen between two angles turned since the first shot.
     pub fn seen_rad(&self, from_rad: f64, to_rad: f64) -> f64 {
         let left_out = self.left_out.map_or(0.0, |gap| {
@@ -207,6 +221,15 @@ pub struct Tally {
     pub merged: u32,
 }
 
+/// What speaks against a packet that nobody claims.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Misfit {
+    /// For people.
+    pub why: String,
+    /// The model that it may still be of, if the user says so.
+    pub may_be: Option<&'static str>,
+}
+
 /// Where a packet stands in its stream and in time.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
@@ -214,6 +237,8 @@ pub struct Place {
     pub time: Timestamp,
     /// Number among the data packets of its stream, 0-based.
     pub packet: u32,
+    /// Rotation rate over the packets before; 0 where it is not known.
+    pub mean_rate_rad_per_ns: f64,
 }
 
 /// Returns of one packet, in the order of the shots. The buffer is meant to be used again and again.
@@ -282,10 +307,10 @@ pub fn companion(payload: &[u8]) -> Option<PacketKind> {
     kinds.find(|kind| *kind != PacketKind::Data)
 }
 
-/// The model that a packet nobody claims comes closest to, and what speaks against it.
-pub fn closest(payload: &[u8]) -> Option<(ModelRef, String)> {
-    let model = MODELS.iter().copied().find(|model| model.fits(payload))?;
-    Some((model, model.misfit(payload)))
+/// How close a packet that nobody claims comes to a known model.
+pub fn closest(payload: &[u8]) -> Option<Misfit> {
+    let model = MODELS.iter().find(|model| model.fits(payload))?;
+    Some(model.misfit(payload))
 }
 
 #[cfg(test)]

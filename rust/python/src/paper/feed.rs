@@ -39,7 +39,7 @@ impl FramePlan {
     #[pyo3(signature = (
         scan, *, lidars, poses, cut_azimuth_deg, box_m, first_ns, period_ns, start_ns, stop_ns
     ))]
-    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keywords of Python
+    #[allow(clippy::too_many_arguments)] // keywords of Python
     fn new(
         scan: &CaptureScan,
         lidars: Vec<usize>,

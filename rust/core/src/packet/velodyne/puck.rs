@@ -13,7 +13,7 @@ use super::{BLOCKS, CHANNELS, Packet, RawReturn, position};
 use crate::cloud::{Return, ReturnKind};
 use crate::error::InvalidValue;
 use crate::packet::beams::{Beam, Beams};
-use crate::packet::{Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
 
 /// Lasers of one unit.
 pub const LASERS: usize = 16;
@@ -137,23 +137,13 @@ impl Model for Puck {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        let Some(packet) = Packet::new(payload) else {
-            return format!("{} bytes instead of {}", payload.len(), super::LEN);
-        };
-        let (mode, product) = (packet.return_mode_byte(), packet.product());
-        if packet.is_lower(0) {
-            format!(
-                "the size fits Velodyne, the factory bytes (0x{mode:02x} 0x{product:02x}) do not"
-            )
-        } else {
-            "the size fits Velodyne, the block flags do not".into()
-        }
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id)
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
         let packet = Packet::new(payload)?;
-        let rotation = rotation(&packet);
+        let rotation = rotation(&packet, 0.0);
         rotation.is_valid(0).then(|| Head {
             device_ns: i64::from(packet.timestamp_us()) * 1000,
             sequence: None,
@@ -207,9 +197,10 @@ fn stride(mode: ReturnMode) -> usize {
     if mode == ReturnMode::Dual { 2 } else { 1 }
 }
 
-fn rotation(packet: &Packet<'_>) -> Rotation {
+fn rotation(packet: &Packet<'_>, mean_rate_rad_per_ns: f64) -> Rotation {
     let rows = (0..BLOCKS).step_by(stride(packet.return_mode()));
-    Rotation::new(rows.map(|block| packet.azimuth_centideg(block)), BLOCK_NS)
+    let azimuths = rows.map(|block| packet.azimuth_centideg(block));
+    Rotation::new(azimuths, BLOCK_NS, mean_rate_rad_per_ns)
 }
 
 /// Rows whose blocks have the flag and an azimuth within one turn.
@@ -270,7 +261,7 @@ impl Decoder for PuckDecoder {
         let Some(packet) = Packet::new(payload) else {
             return out.drops.add("packet_size", 1);
         };
-        let rotation = rotation(&packet);
+        let rotation = rotation(&packet, place.mean_rate_rad_per_ns);
         let stride = stride(packet.return_mode());
         for row in 0..BLOCKS / stride {
             if !is_usable(&packet, row, stride) {
@@ -465,6 +456,7 @@ mod tests {
         let place = Place {
             time: Timestamp(1_000_000),
             packet: 9,
+            mean_rate_rad_per_ns: 0.0,
         };
         decoder.decode(&bytes, place, &mut out);
         let [echo] = out.returns[..] else {
