@@ -42,7 +42,24 @@ def compare(
 
     taken = comparison.recognise(against, kind=kind)
     talk.note(f"{against}: taken as {taken.kind} ({taken.why})")
+    if taken.kind != "run":
+        refuse_unloaded(results)
     frame = comparison.compare(results, taken)
     comparison.save(results, frame)
     document = {"schema": SCHEMA, "rows": frame.to_dicts()}
     talk.result(document, comparison.table2(frame))
+
+
+def refuse_unloaded(results: Path) -> None:
+    """Refuse a run without a loaded hold: of nothing but noise there is no error in percent."""
+    from lidar_deflect.errors import MeasurementError
+    from lidar_deflect.results import Folder
+
+    steps = sorted(set(Folder(results).steps["step"]))
+    if all(step.startswith("0 %") for step in steps):
+        raise MeasurementError(
+            f"{results} has no loaded hold",
+            code="comparison.not_loaded",
+            facts=[("steps", ", ".join(steps) or "none")],
+            hint="measure a capture in which the blade is held under load",
+        )

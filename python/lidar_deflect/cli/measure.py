@@ -104,6 +104,8 @@ def verdict(result: "Result", talk: Talk) -> int:
     """Pass on what a reader of the result should know; return the exit code of a finished run."""
     for warning in result.run["warnings"]:
         talk.warn(warning)
+    if all(step.startswith("0 %") for step in result.steps["step"]):
+        talk.warn("no loaded hold was found: there is no deflection but noise")
     for gate in result.failed_gates:
         talk.warn(f"quality gate: {gate}")
     return QUALITY if result.failed_gates else 0
