@@ -71,11 +71,7 @@ fn scan_capture(
     sensors: Vec<(String, String)>,
     progress: Option<Py<PyAny>>,
 ) -> BorderResult<CaptureScan> {
-    let mut options = ScanOptions::default();
-    for (source, id) in &sensors {
-        let named = (Source::parse(source)?, packet::model(id)?);
-        options.models.push(named);
-    }
+    let options = options(&sensors)?;
     let (mut report, mut files) = scan_once(py, &paths, options, progress.as_ref())?;
     if let Some(options) = report.split() {
         (report, files) = scan_once(py, &paths, options, progress.as_ref())?;
@@ -85,6 +81,15 @@ fn scan_capture(
         report: Arc::new(report),
         files,
     })
+}
+
+fn options(sensors: &[(String, String)]) -> BorderResult<ScanOptions> {
+    let mut options = ScanOptions::default();
+    for (source, id) in sensors {
+        let named = (Source::parse(source)?, packet::model(id)?);
+        options.models.push(named);
+    }
+    Ok(options)
 }
 
 fn scan_once(
@@ -101,6 +106,42 @@ fn scan_once(
     })? {}
     let report = py.detach(|| scan.finish());
     Ok((report, feed.report()))
+}
+
+/// Reads `head_s` seconds of a capture and its last records.
+///
+/// What is counted is of the head; the second value gives the end of the last packet of each lidar
+/// that is seen in the tail, by name, UTC in nanoseconds.
+#[pyfunction]
+#[pyo3(signature = (paths, *, sensors, head_s))]
+#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
+fn scan_quickly(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    sensors: Vec<(String, String)>,
+    head_s: f64,
+) -> BorderResult<(CaptureScan, Vec<(String, i64)>)> {
+    let options = options(&sensors)?;
+    let mut feed = Feed::open(py, &paths)?;
+    let mut scan = Scan::new(options.clone());
+    let mut first = None;
+    while feed.block(py, None, |datagram| {
+        scan.push(datagram);
+        let first = *first.get_or_insert(datagram.time);
+        if datagram.time.seconds_since(first) > head_s {
+            feed::Want::Stop
+        } else {
+            feed::Want::More
+        }
+    })? {}
+    let report = scan.finish();
+    let ends = py.detach(|| feed::ends(&paths, &options));
+    let scan = CaptureScan {
+        paths,
+        report: Arc::new(report),
+        files: feed.report(),
+    };
+    Ok((scan, ends))
 }
 
 /// Looks at the first bytes of all files, so that what is no capture is told at once.
@@ -123,6 +164,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<points::PointIterator>()?;
     module.add_function(wrap_pyfunction!(cut::cut_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_models, module)?)
 }

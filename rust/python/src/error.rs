@@ -1,6 +1,7 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
 use lidar_deflect_core::error::{CaptureError, ClusterError, Coded, FitError, InvalidValue};
+use lidar_deflect_core::paper::tip::NoTip;
 use lidar_deflect_core::register::wall::WallError;
 use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
@@ -48,6 +49,7 @@ translate! {
     ClusterError => "InvalidValueError",
     FitError => "MeasurementError",
     InvalidValue => "InvalidValueError",
+    NoTip => "MeasurementError",
     WallError => "CalibrationError",
 }
 

@@ -187,7 +187,7 @@ impl ContourSeries {
     pub fn arc_to_tip_m(&self, plane: Plane, z_m: &[f64]) -> Vec<f64> {
         self.at_each(z_m, f64::NAN, |frame, z| {
             let tip = frame.tip(plane).ok()?;
-            mid_line(frame)?.length_m(z, tip.z_m)
+            mid_line(frame)?.length_m(z, tip.z_m).ok()
         })
     }
 
@@ -195,7 +195,7 @@ impl ContourSeries {
     pub fn sections_m(&self, plane: Plane, to_tip_m: &[f64]) -> Vec<[f64; 3]> {
         self.at_each(to_tip_m, [f64::NAN; 3], |frame, length| {
             let tip = frame.tip(plane).ok()?;
-            mid_line(frame)?.before_tip_m(tip.z_m, length)
+            mid_line(frame)?.before_tip_m(tip.z_m, length).ok()
         })
     }
 
@@ -239,10 +239,7 @@ impl ContourSeries {
 }
 
 fn mid_line(frame: &FrameContours) -> Option<MidLine> {
-    frame
-        .contours
-        .as_ref()
-        .and_then(|both| MidLine::new(&both.leading, &both.trailing))
+    frame.contours.as_ref()?.middle().ok()
 }
 
 fn sample(frame: &Frame, params: &FrameParams, sampling: Sampling) -> Vec<BladePoints> {

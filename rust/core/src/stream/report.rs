@@ -7,8 +7,8 @@ use crate::clock::ClockModel;
 use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
-use crate::packet::ModelRef;
 use crate::packet::velodyne::position::Pps;
+use crate::packet::{Misfit, ModelRef};
 use crate::time::Timestamp;
 
 /// One lidar of a capture.
@@ -121,7 +121,7 @@ pub struct OtherStream {
     /// Datagrams a second.
     pub rate_hz: f64,
     /// The sensor that it comes closest to, and what speaks against it.
-    pub closest: Option<(&'static str, String)>,
+    pub closest: Option<Misfit>,
 }
 
 /// A stretch in which nothing at all was recorded.

@@ -12,7 +12,7 @@ use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
 use crate::packet::velodyne::position::{Position, Pps};
-use crate::packet::{ModelRef, PacketKind, Tally, closest, companion};
+use crate::packet::{Misfit, ModelRef, PacketKind, Tally, closest, companion};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 
 /// Silence of the whole capture for longer than this is a pause of the recording, not loss.
@@ -21,6 +21,8 @@ const PAUSE_NS: i64 = 10 * NANOS_PER_SECOND;
 const MAX_STREAMS: usize = 4096;
 /// Gaps wait for the field of view to be known, but not more of them than this.
 const MAX_PENDING: usize = 4096;
+/// Foreign datagrams before a stream is decided whose second is remembered.
+const MAX_EARLY: usize = 1024;
 /// Turns after which the field of view is known.
 const VIEW_TURNS: u32 = 5;
 /// More packets than one sensor can send by this factor come from two.
@@ -50,10 +52,12 @@ struct Stream {
     state: State,
     packets: u64,
     foreign: u64,
+    /// When foreign datagrams came before the stream was decided, the first few.
+    early_foreign: Vec<Timestamp>,
     first: Timestamp,
     last: Timestamp,
     payload_len: usize,
-    closest: Option<(&'static str, String)>,
+    closest: Option<Misfit>,
     position: Option<PositionFacts>,
 }
 
@@ -186,6 +190,7 @@ impl Stream {
             state: State::Probing(Probe::new(named)),
             packets: 0,
             foreign: 0,
+            early_foreign: Vec::new(),
             first: datagram.time,
             last: datagram.time,
             payload_len: datagram.payload.len(),
@@ -215,9 +220,11 @@ impl Stream {
                     }
                 } else if !self.take_position(datagram) {
                     self.foreign += 1;
+                    if self.early_foreign.len() < MAX_EARLY {
+                        self.early_foreign.push(datagram.time);
+                    }
                     if self.closest.is_none() {
-                        let near = closest(payload);
-                        self.closest = near.map(|(model, why)| (model.id(), why));
+                        self.closest = closest(payload);
                     }
                 }
             }
@@ -268,6 +275,9 @@ impl Stream {
             }
         }
         self.state = State::Lidar(lidar);
+        for arrival in std::mem::take(&mut self.early_foreign) {
+            self.note_foreign(arrival, shared);
+        }
     }
 
     fn finish(&mut self, shared: &mut Shared) {
@@ -275,8 +285,8 @@ impl Stream {
         match &mut self.state {
             State::Lidar(lidar) => lidar.finish(shared),
             State::Probing(probe) => {
-                if let Some((why, model)) = probe.doubt() {
-                    self.closest = Some((model.id(), why));
+                if let Some(why) = probe.doubt() {
+                    self.closest = Some(Misfit { why, may_be: None });
                 }
             }
         }

@@ -13,7 +13,7 @@ use super::{BLOCKS, CHANNELS, Packet, RawReturn, position};
 use crate::cloud::{Return, ReturnKind};
 use crate::error::InvalidValue;
 use crate::packet::beams::{Beam, Beams};
-use crate::packet::{Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
 
 /// Lasers of one unit.
 pub const LASERS: usize = 16;
@@ -137,18 +137,8 @@ impl Model for Puck {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        let Some(packet) = Packet::new(payload) else {
-            return format!("{} bytes instead of {}", payload.len(), super::LEN);
-        };
-        let (mode, product) = (packet.return_mode_byte(), packet.product());
-        if packet.is_lower(0) {
-            format!(
-                "the size fits Velodyne, the factory bytes (0x{mode:02x} 0x{product:02x}) do not"
-            )
-        } else {
-            "the size fits Velodyne, the block flags do not".into()
-        }
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id)
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
