@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lidar_deflect.cli.measure import measured_steps
 from lidar_deflect.cli.options import Json, Quiet, Verbose
 from lidar_deflect.cli.talk import Talk
 
@@ -55,7 +56,7 @@ def refuse_unloaded(results: Path) -> None:
     from lidar_deflect.errors import MeasurementError
     from lidar_deflect.results import Folder
 
-    steps = sorted(set(Folder(results).steps["step"]))
+    steps = measured_steps(Folder(results).steps)
     if all(step.startswith("0 %") for step in steps):
         raise MeasurementError(
             f"{results} has no loaded hold",
