@@ -265,3 +265,9 @@ def test_lost_packets_of_the_scenes_equal_the_truth(scene: str) -> None:
     assert found == {
         lidar["source"]: (lidar["packets_lost"], lidar["packets_sent"]) for lidar in truth
     }
+
+
+def test_the_page_of_sensors_lists_every_model() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "sensors.md").read_text()
+    listed = {line.split("`")[1] for line in page.splitlines() if line.startswith("| `")}
+    assert listed == {model for model, _ in capture.sensor_models()}

@@ -5,7 +5,7 @@ mod puck;
 
 use lidar_deflect_core::packet::velodyne::position::Position;
 use lidar_deflect_core::packet::velodyne::puck::{PRODUCT_HIRES, PRODUCT_VLP16};
-use lidar_deflect_core::packet::velodyne::{BLOCKS, RawBlock, RawReturn, encode};
+use lidar_deflect_core::packet::velodyne::{RawBlock, RawReturn, encode};
 use lidar_deflect_core::packet::{
     Decoded, MODELS, ModelRef, Place, ReturnMode, closest, companion, model,
 };
@@ -175,8 +175,8 @@ proptest! {
         model.decoder(&model.beams()).unwrap().decode(&payload, place, &mut out);
         let beams = model.beams();
         let mut returns = out.returns.iter();
-        for number in 0..BLOCKS {
-            for (channel, echo) in blocks[number].returns.iter().enumerate() {
+        for (number, block) in blocks.iter().enumerate() {
+            for (channel, echo) in block.returns.iter().enumerate() {
                 if echo.range == 0 {
                     continue;
                 }
