@@ -300,8 +300,11 @@ def test_what_exists_is_not_overwritten_unasked(
 # Ctrl-C.
 
 SOON_S = 5.0
+# A shell starts its background jobs, and so perhaps these tests, with Ctrl-C ignored.
 STARTED = """\
+import signal
 import sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from lidar_deflect.cli import main
 print("started", flush=True)
 main()
