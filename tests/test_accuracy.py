@@ -11,6 +11,7 @@ import polars as pl
 import pytest
 
 import lidar_deflect as ld
+from lidar_deflect.decode import decode
 from lidar_deflect.result import Result
 from scenes import SCENES, configuration, needs_scenes
 
@@ -100,3 +101,25 @@ def test_the_same_capture_gives_the_same_tables(
     path.write_text(configuration("edge"))
     again = ld.Test.load(path).measure(SCENES / "edge" / "capture.pcap.gz", threads=1)
     assert again.deflection.equals(measured["edge"].deflection)
+
+
+def test_a_run_without_an_unloaded_hold_is_measured_with_a_calibration_of_another(
+    measured: dict[str, Result], tmp_path: Path
+) -> None:
+    path = tmp_path / "edge.toml"
+    path.write_text(configuration("edge"))
+    test = ld.Test.load(path)
+    whole = ld.open(SCENES / "edge" / "capture.pcap.gz")
+    decode(whole, tmp_path / "zero.pcap", stop_s=4.0)
+    decode(whole, tmp_path / "loaded.pcap", start_s=17.0)
+    test.calibrate(tmp_path / "zero.pcap").save(tmp_path / "calibration.toml")
+    result = test.measure(tmp_path / "loaded.pcap", calibration=tmp_path / "calibration.toml")
+    of_whole = measured["edge"].steps.filter(pl.col("step") == "100 %")
+    found = result.steps.filter(pl.col("step") == "100 %")
+    # Another choice of intervals of (10), another scatter of the tip: centimetres across, and
+    # along the span what a single tip scatters.
+    for axis, within_m in (("x", 0.03), ("y", 0.03), ("z", 0.3)):
+        assert (found[f"d{axis}_m"] - of_whole[f"d{axis}_m"]).abs().max() < within_m
+    late = test.measure(SCENES / "edge" / "capture.pcap.gz", start_s=17.0)
+    assert late.deflection["t_s"].min() > 17.0
+    assert late.steps["step"].unique().to_list() == ["100 %"]

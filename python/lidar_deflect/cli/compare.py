@@ -54,7 +54,7 @@ def compare(
 def refuse_unloaded(results: Path) -> None:
     """Refuse a run without a loaded hold: of nothing but noise there is no error in percent."""
     from lidar_deflect.errors import MeasurementError
-    from lidar_deflect.results import Folder
+    from lidar_deflect.folder import Folder
 
     steps = measured_steps(Folder(results).steps)
     if all(step.startswith("0 %") for step in steps):
