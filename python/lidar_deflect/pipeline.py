@@ -211,7 +211,7 @@ def result_of(
 
 
 def _measured_holds(opened: OpenedTest, states: States) -> Sequence[Hold]:
-    """Holds of the load channel that were measured, else those of the deflection itself."""
+    """Return the measured holds of the load channel, else those of the deflection itself."""
     if opened.holds is None:
         return hold_finder.from_deflection(states.time_ns, states.farthest_m)
     return [hold for hold in opened.holds if hold.contains(states.time_ns).any()]
