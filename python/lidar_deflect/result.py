@@ -138,7 +138,7 @@ class Result:
         return cls(
             frames,
             json.loads((folder / "run.json").read_text(encoding="utf-8")),
-            configs.load(folder / "test.toml"),
+            configs.load(folder / "test.toml", check_files=False),
             Calibration.load(folder / "calibration.toml"),
             folder,
         )
