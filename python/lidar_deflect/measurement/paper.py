@@ -15,7 +15,12 @@ from lidar_deflect.measurement.plan import Plan, make_plan
 from lidar_deflect.measurement.plane import choose_plane
 from lidar_deflect.measurement.reference import Reference, reference_of
 from lidar_deflect.measurement.states import MISSING, States
-from lidar_deflect.measurement.status import extrapolate, grade_frames, interpolate
+from lidar_deflect.measurement.status import (
+    extrapolate,
+    grade_frames,
+    interpolate,
+    refuse_stretched,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,6 +92,7 @@ def sections_over_time(
     status = np.repeat(status[:, None], count, axis=1)
     reason = np.repeat(reason[:, None], count, axis=1)
     position[status == MISSING] = np.nan
+    refuse_stretched(status, reason, position, reference.s_m)
     extrapolate(status, reason, position[:, :, 2], contours.seen_z_m)
     if inputs.config.paper.overhead == "interpolate":
         interpolate(contours.time_ns, position, status, reason)

@@ -51,8 +51,8 @@ pub struct Tip {
 /// Why a frame has no tip: never a number instead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum NoTip {
-    /// The curves do not meet within one visible length beyond the last sample.
-    #[error("the contour curves do not meet within one visible length beyond the last scan line")]
+    /// The curves do not meet within two visible lengths beyond the last sample.
+    #[error("the contour curves do not meet within two visible lengths beyond the last scan line")]
     NoIntersection,
     /// The curves are nearly parallel where they meet.
     #[error("the contour curves are nearly parallel where they meet: the tip is ill-posed")]
@@ -82,10 +82,12 @@ impl Coded for NoTip {
     }
 }
 
+/// The curves must meet within so many visible lengths beyond the last sample.
+const BEYOND_END: f64 = 2.0;
 /// The curves may meet a little before the last sample: share of the visible length.
 const BEFORE_END: f64 = 0.15;
-/// Steps of the search for a change of sign, over one visible length.
-const STEPS: u32 = 256;
+/// Steps of the search for a change of sign.
+const STEPS: u32 = 512;
 
 /// Intersects both contour curves on a plane, beyond the visible part of the blade.
 ///
@@ -101,8 +103,8 @@ pub fn intersect(
     let end = leading.seen_z_m[1].max(trailing.seen_z_m[1]);
     let length = end - leading.seen_z_m[0].min(trailing.seen_z_m[0]);
     let gap = |z: f64| a.estimate.value(z) - b.estimate.value(z);
-    let z_m =
-        first_root(gap, end - BEFORE_END * length, end + length).ok_or(NoTip::NoIntersection)?;
+    let z_m = first_root(gap, end - BEFORE_END * length, end + BEYOND_END * length)
+        .ok_or(NoTip::NoIntersection)?;
     let slope = (a.estimate.slope(z_m) - b.estimate.slope(z_m)).abs();
     let u_z_m = (a.variance_at(z_m) + b.variance_at(z_m)).sqrt() / slope;
     if u_z_m <= limits.max_u_m {
