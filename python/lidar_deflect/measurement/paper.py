@@ -6,6 +6,7 @@ Rust, in blocks of frames. Steps 1 to 4 are `lidar_deflect.registration`.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -62,7 +63,7 @@ def measure(inputs: Inputs) -> States:
         contour=_blade_line(inputs, contours, reference),
         points=contours.points(inputs.lidars),
         rejected=contours.rejected(),
-        evidence=_evidence(plan, contours, reference),
+        evidence=_evidence(plan, contours, reference, reason[status == MISSING]),
         warnings=(*plan.warnings, *plane_warnings),
     )
 
@@ -139,12 +140,15 @@ def _blade_line(inputs: Inputs, contours: ContourRun, reference: Reference) -> M
     }
 
 
-def _evidence(plan: Plan, contours: ContourRun, reference: Reference) -> Mapping[str, Any]:
+def _evidence(
+    plan: Plan, contours: ContourRun, reference: Reference, refused: NDArray[np.object_]
+) -> Mapping[str, Any]:
     failures = [name for name in contours.failures(reference.plane) if name is not None]
     return {
         "plan": plan.to_dict(),
         "plane": reference.plane,
         "reference": reference.to_dict(),
         "frames": len(contours.time_ns),
-        "refused_frames": {name: failures.count(name) for name in sorted(set(failures))},
+        "refused_frames": dict(sorted(Counter(failures).items())),
+        "missing_states": dict(sorted(Counter(refused.tolist()).items())),
     }
