@@ -15,6 +15,7 @@ __all__ = [
     "FrameParams",
     "FramePlan",
     "Simulation",
+    "PointIterator",
     "Sweep",
     "SweepIterator",
     "__version__",
@@ -22,6 +23,7 @@ __all__ = [
     "reference_blades",
     "rotation_about_up",
     "rotation_onto",
+    "cut_capture",
     "scan_capture",
     "sensor_models",
     "yaw_from_wall",
@@ -30,6 +32,15 @@ __all__ = [
 __version__: str
 
 def check_captures(paths: Sequence[Path]) -> None: ...
+def cut_capture(
+    scan: CaptureScan,
+    out: Path,
+    *,
+    lidars: Sequence[int],
+    start_ns: int | None = None,
+    stop_ns: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> int: ...
 def scan_capture(
     paths: Sequence[Path],
     *,
@@ -48,6 +59,25 @@ class CaptureScan:
     def last_time_ns(self) -> int | None: ...
     def describe(self) -> dict[str, Any]: ...
     def health(self) -> dict[str, Any]: ...
+
+@final
+class PointIterator(Iterator[dict[str, NDArray[Any]]]):
+    def __new__(
+        cls,
+        scan: CaptureScan,
+        *,
+        lidars: Sequence[int],
+        block_points: int,
+        start_ns: int | None = None,
+        stop_ns: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> PointIterator: ...
+    def __iter__(self) -> PointIterator: ...
+    def __next__(self) -> dict[str, NDArray[Any]]: ...
+    @property
+    def merged(self) -> int: ...
+    @property
+    def drops(self) -> list[tuple[str, int]]: ...
 
 @final
 class Sweep:

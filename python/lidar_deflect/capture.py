@@ -85,6 +85,11 @@ class Capture:
         self._scan = scan
 
     @property
+    def sensors(self) -> Mapping[str, str]:
+        """Models that were named, by source."""
+        return MappingProxyType(self._sensors)
+
+    @property
     def native(self) -> _native.CaptureScan:
         """The scan of the compiled core, for functions that read the capture there."""
         self.scan()

@@ -6,7 +6,7 @@
 from lidar_deflect.tables.build import Values, build, check, empty
 from lidar_deflect.tables.catalogue import RETURN_KINDS, SCHEMA_VERSION, SCHEMAS, STATUSES
 from lidar_deflect.tables.describe import json_schema, markdown
-from lidar_deflect.tables.files import HASH_KEY, metadata, read, write
+from lidar_deflect.tables.files import HASH_KEY, metadata, own_metadata, read, write
 from lidar_deflect.tables.schema import UTC_NS, Column, Table, nearest_hint
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "markdown",
     "metadata",
     "nearest_hint",
+    "own_metadata",
     "read",
     "write",
 ]

@@ -17,6 +17,12 @@ HASH_KEY = "configuration_hash"
 """Metadata key of the hash of the resolved configuration."""
 
 
+def own_metadata(name: str) -> dict[str, str]:
+    """Metadata that every file of table `name` carries: schema and program version, table."""
+    facts = (str(SCHEMA_VERSION), version("lidar-deflect"), name)
+    return dict(zip(_OWN, facts, strict=True))
+
+
 def write(
     frame: pl.DataFrame,
     path: str | Path,

@@ -1,13 +1,15 @@
 //! Cuts a stream of returns into sweeps, one per turn: a state machine without input or output.
 
+mod turns;
+
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
-use crate::angle::{wrap_half_turn, wrap_turn};
 use crate::cloud::PointCloud;
 use crate::frame::Sensor;
 use crate::packet::{Decoded, Head};
 use crate::time::Timestamp;
+pub use turns::Turns;
 
 /// One turn of one lidar.
 #[derive(Debug, Clone)]
@@ -58,28 +60,10 @@ pub struct Placed {
 #[derive(Debug)]
 pub struct SweepCutter {
     lidar: usize,
-    cut_rad: f64,
+    turns: Turns,
     visible_rad: f64,
     open: Option<Open>,
-    /// Where the last packet ended.
-    end: Option<End>,
     spare: Vec<PointCloud<Sensor>>,
-}
-
-/// Where a packet ended: azimuth counted on over all turns, and time.
-#[derive(Debug, Clone, Copy)]
-struct End {
-    turned_rad: f64,
-    time: Timestamp,
-}
-
-impl End {
-    fn of(packet: &Placed, start_rad: f64) -> Self {
-        Self {
-            turned_rad: start_rad + packet.head.turned_rad.max(0.0),
-            time: packet.time + packet.head.duration_ns,
-        }
-    }
 }
 
 /// The sweep that is being filled.
@@ -99,10 +83,9 @@ impl SweepCutter {
     pub fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self {
         Self {
             lidar,
-            cut_rad: wrap_turn(cut_rad),
+            turns: Turns::new(cut_rad),
             visible_rad: visible_rad.clamp(1e-3, TAU),
             open: None,
-            end: None,
             spare: Vec::new(),
         }
     }
@@ -114,8 +97,7 @@ impl SweepCutter {
 
     /// Follows the rotor over a packet whose returns are not wanted.
     pub fn skip(&mut self, packet: &Placed) {
-        let start_rad = self.place(packet);
-        self.end = Some(End::of(packet, start_rad));
+        self.turns.follow(packet, self.turns.place(packet));
     }
 
     /// Gives the memory of a sweep back for the next ones.
@@ -126,16 +108,20 @@ impl SweepCutter {
 
     /// Adds one packet; finished sweeps are appended to `out`.
     pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep>) {
-        let start_rad = self.place(packet);
+        let start_rad = self.turns.place(packet);
         let end_rad = start_rad + packet.head.turned_rad.max(0.0);
         let lost_behind_cut = self.add_lost(packet, start_rad);
-        let first_turn = turn_of(start_rad);
-        let gap = self.end.filter(|_| packet.lost > 0);
-        let gap = gap.map(|end| Gap { from: end.time, to: packet.time });
+        let first_turn = Turns::turn_of(start_rad);
+        let gap = self.turns.end().filter(|_| packet.lost > 0);
+        let gap = gap.map(|end| Gap {
+            from: end.time,
+            to: packet.time,
+        });
         if self.open.as_ref().is_none_or(|open| open.turn < first_turn) {
             // A gap over the cut belongs to the sweeps on both sides.
             self.add_gap(gap);
-            self.close(self.end.map_or(packet.time, |end| end.time), out);
+            let end = self.turns.end().map_or(packet.time, |end| end.time);
+            self.close(end, out);
             self.open(first_turn, packet.time);
         }
         self.add_gap(gap);
@@ -144,35 +130,20 @@ impl SweepCutter {
             open.lost = open.lost.saturating_add(lost_behind_cut);
         }
         self.fill(packet, decoded, start_rad, end_rad, out);
-        self.end = Some(End::of(packet, start_rad));
+        self.turns.follow(packet, start_rad);
     }
 
     /// The sweep that is not complete yet, at the end of the stream.
     pub fn finish(&mut self, out: &mut VecDeque<Sweep>) {
-        if let Some(end) = self.end {
+        if let Some(end) = self.turns.end() {
             self.close(end.time, out);
         }
-    }
-
-    /// Azimuth of the packet's start after the cut, counted on over all turns since the first packet:
-    /// the one nearest to where time says that the rotor must be.
-    fn place(&self, packet: &Placed) -> f64 {
-        let after_cut_rad = wrap_turn(packet.head.azimuth_rad - self.cut_rad);
-        let Some(end) = self.end else {
-            return after_cut_rad;
-        };
-        if packet.is_jump {
-            return f64::from(turn_of(end.turned_rad) + 1) * TAU + after_cut_rad;
-        }
-        let paused_ns = (packet.time - end.time).max(0) as f64;
-        let expected_rad = end.turned_rad + paused_ns * packet.head.rate_rad_per_ns.max(0.0);
-        expected_rad + wrap_half_turn(after_cut_rad - wrap_turn(expected_rad))
     }
 
     /// Counts missing packets before the cut to the open sweep; gives those of the turn that the
     /// packet begins in. Turns of which nothing arrived keep theirs.
     fn add_lost(&mut self, packet: &Placed, start_rad: f64) -> u32 {
-        let (Some(open), Some(end)) = (&mut self.open, self.end) else {
+        let (Some(open), Some(end)) = (&mut self.open, self.turns.end()) else {
             return 0;
         };
         let gap_rad = (start_rad - end.turned_rad).max(1e-9);
@@ -182,7 +153,7 @@ impl SweepCutter {
         };
         let here = until(open.turn.saturating_add(1));
         open.lost = open.lost.saturating_add(here);
-        let whole = until(turn_of(start_rad)).max(here);
+        let whole = until(Turns::turn_of(start_rad)).max(here);
         u32::try_from(packet.lost)
             .unwrap_or(u32::MAX)
             .saturating_sub(whole)
@@ -234,11 +205,11 @@ impl SweepCutter {
         let mut from = 0;
         let mut from_rad = start_rad;
         while let Some(open) = &mut self.open {
-            let cut_rad = (f64::from(open.turn) + 1.0) * TAU;
+            let cut_rad = Turns::cut_after(open.turn);
             if end_rad < cut_rad {
                 break;
             }
-            let to = from + before(decoded, from, packet, cut_rad - start_rad);
+            let to = decoded.before(from, &packet.head, cut_rad - start_rad);
             open.cloud.extend(&decoded.returns[from..to]);
             open.seen_rad += packet
                 .head
@@ -257,25 +228,3 @@ impl SweepCutter {
         }
     }
 }
-
-fn turn_of(turned_rad: f64) -> u32 {
-    (turned_rad / TAU).floor().max(0.0) as u32
-}
-
-/// How many of the returns from number `from` on were shot before the rotor had turned by `cut_rad`
-/// since the packet's start.
-fn before(decoded: &Decoded, from: usize, packet: &Placed, cut_rad: f64) -> usize {
-    let start_rad = packet.head.azimuth_rad;
-    let is_before = |encoder_rad: &f32| {
-        let turned_rad = wrap_turn(f64::from(*encoder_rad) - start_rad + BACKLASH_RAD);
-        turned_rad - BACKLASH_RAD < cut_rad
-    };
-    let encoder = &decoded.encoder_rad[from..];
-    encoder
-        .iter()
-        .position(|e| !is_before(e))
-        .unwrap_or(encoder.len())
-}
-
-/// The encoder may seem to step back by so much.
-const BACKLASH_RAD: f64 = 0.02;

@@ -16,7 +16,14 @@ pub fn points<'a, T: numpy::Element>(
     name: &'static str,
     array: &'a PyReadonlyArray2<'_, T>,
 ) -> BorderResult<&'a [[T; 3]]> {
-    Ok(flat(name, "shape (n, 3) in C order", array.shape()[1] == 3, array)?.as_chunks().0)
+    Ok(flat(
+        name,
+        "shape (n, 3) in C order",
+        array.shape()[1] == 3,
+        array,
+    )?
+    .as_chunks()
+    .0)
 }
 
 /// Borrows a contiguous array of `len` values, without a copy.
@@ -72,7 +79,14 @@ pub fn pairs<'a>(
     name: &'static str,
     array: &'a PyReadonlyArray2<'_, f64>,
 ) -> BorderResult<&'a [[f64; 2]]> {
-    Ok(flat(name, "shape (n, 2) in C order", array.shape()[1] == 2, array)?.as_chunks().0)
+    Ok(flat(
+        name,
+        "shape (n, 2) in C order",
+        array.shape()[1] == 2,
+        array,
+    )?
+    .as_chunks()
+    .0)
 }
 
 /// Reads an array of `count` homogeneous matrices.
@@ -92,7 +106,12 @@ pub fn expect_rows(name: &'static str, found: usize, expected: usize) -> BorderR
         return Ok(());
     }
     let (expected, found) = (format!("{expected} rows"), format!("{found} rows"));
-    Err(InvalidValue { name, expected, found }.into())
+    Err(InvalidValue {
+        name,
+        expected,
+        found,
+    }
+    .into())
 }
 
 fn flat<'a, T: numpy::Element, D: Dimension>(
@@ -101,11 +120,17 @@ fn flat<'a, T: numpy::Element, D: Dimension>(
     fits: bool,
     array: &'a PyReadonlyArray<'_, T, D>,
 ) -> BorderResult<&'a [T]> {
-    let refuse = |found: String| InvalidValue { name, expected: expected.into(), found };
+    let refuse = |found: String| InvalidValue {
+        name,
+        expected: expected.into(),
+        found,
+    };
     if !fits {
         return Err(refuse(format!("shape {:?}", array.shape())).into());
     }
-    Ok(array.as_slice().map_err(|_| refuse("a strided view".into()))?)
+    Ok(array
+        .as_slice()
+        .map_err(|_| refuse("a strided view".into()))?)
 }
 
 /// Hands over rows of a fixed number of columns, (n, N), without a copy.
@@ -133,5 +158,8 @@ pub fn tables<'py>(
     columns: usize,
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let rows = points.len() / columns.max(1);
-    points.into_flattened().into_pyarray(py).reshape([rows, columns, 3])
+    points
+        .into_flattened()
+        .into_pyarray(py)
+        .reshape([rows, columns, 3])
 }

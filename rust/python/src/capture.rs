@@ -1,8 +1,10 @@
 //! Captures across the border: a scan, sweeps, and the files between.
 
 mod columns;
+mod cut;
 mod describe;
 pub mod feed;
+mod points;
 mod sweeps;
 
 use std::path::PathBuf;
@@ -120,6 +122,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<CaptureScan>()?;
     module.add_class::<sweeps::Sweep>()?;
     module.add_class::<sweeps::SweepIterator>()?;
+    module.add_class::<points::PointIterator>()?;
+    module.add_function(wrap_pyfunction!(cut::cut_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_models, module)?)

@@ -19,6 +19,13 @@ impl From<PyErr> for BorderError {
     }
 }
 
+/// Becomes an `OSError` with its number, which the caller in Python turns into what it meant to do.
+impl From<std::io::Error> for BorderError {
+    fn from(error: std::io::Error) -> Self {
+        Self(error.into())
+    }
+}
+
 impl From<BorderError> for PyErr {
     fn from(error: BorderError) -> Self {
         error.0

@@ -230,12 +230,26 @@ pub struct Decoded {
 }
 
 impl Decoded {
+    /// Number of the first return, from number `from` on, that was shot after the rotor had turned by
+    /// `turned_rad` since the first shot of the packet with this head.
+    pub fn before(&self, from: usize, head: &Head, turned_rad: f64) -> usize {
+        let is_behind = |encoder_rad: &f32| {
+            let since_rad = f64::from(*encoder_rad) - head.azimuth_rad + BACKLASH_RAD;
+            wrap_turn(since_rad) - BACKLASH_RAD >= turned_rad
+        };
+        let behind = self.encoder_rad[from..].iter().position(is_behind);
+        behind.map_or(self.encoder_rad.len(), |place| from + place)
+    }
+
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
         self.returns.clear();
         self.encoder_rad.clear();
     }
 }
+
+/// The encoder may seem to step back by so much.
+const BACKLASH_RAD: f64 = 0.02;
 
 /// Decodes the data packets of one stream; may carry state from packet to packet.
 pub trait Decoder: Send + Sync {

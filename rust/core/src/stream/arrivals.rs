@@ -153,6 +153,11 @@ impl<T> Arrivals<T> {
         Some((self.pass(ticket, lost, is_late, is_jump), item))
     }
 
+    /// Jumps of the clock so far.
+    pub fn segment(&self) -> usize {
+        self.segment
+    }
+
     /// The stream has ended.
     pub fn flush(&mut self) {
         if let Some(order) = &mut self.order {

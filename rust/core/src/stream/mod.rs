@@ -4,6 +4,8 @@
 //! arrived and judges their clocks; [`SweepReader`] then turns the same datagrams into sweeps.
 
 mod arrivals;
+mod cut;
+mod points;
 mod probe;
 mod reader;
 mod report;
@@ -16,7 +18,9 @@ use crate::capture::Datagram;
 use crate::error::InvalidValue;
 use crate::packet::ModelRef;
 
-pub use reader::{SweepOptions, SweepReader};
+pub use cut::CaptureCut;
+pub use points::{PointBlock, PointReader, PointTagger};
+pub use reader::{Reader, Sink, SweepOptions, SweepReader};
 pub use report::{Health, OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
 pub use scan::Scan;
 

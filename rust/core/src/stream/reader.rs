@@ -23,7 +23,7 @@ pub struct SweepOptions {
     /// Numbers of the lidars in the report; `None`: all.
     pub lidars: Option<Vec<usize>>,
     /// Azimuths at which sweeps are cut, by number of the lidar; 0 where there is none.
-    pub cut_rad: Vec<f64>,
+    pub cut_azimuth_rad: Vec<f64>,
     /// Beams of single units, by number of the lidar.
     pub beams: Vec<(usize, Beams)>,
     /// Packets before this are left out.
@@ -32,11 +32,32 @@ pub struct SweepOptions {
     pub stop: Option<Timestamp>,
 }
 
+/// Takes the returns of one lidar in order and makes something of them.
+pub trait Sink {
+    /// Where all lidars' results are gathered.
+    type Out: Default;
+
+    /// For the lidar with this number; `visible_rad` is the angle of the turn that it sends.
+    fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self;
+
+    /// A packet whose returns are not wanted.
+    fn skip(&mut self, packet: &Placed);
+
+    /// A packet and its returns.
+    fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut Self::Out);
+
+    /// The stream has ended.
+    fn finish(&mut self, out: &mut Self::Out);
+}
+
 /// Turns datagrams into sweeps.
-pub struct SweepReader {
+pub type SweepReader = Reader<SweepCutter>;
+
+/// Decodes the datagrams of a capture that was scanned; what becomes of the returns is up to `S`.
+pub struct Reader<S: Sink> {
     options: ScanOptions,
-    lanes: HashMap<StreamKey, Lane>,
-    ready: VecDeque<Sweep>,
+    lanes: HashMap<StreamKey, Lane<S>>,
+    pub(super) out: S::Out,
     decoded: Decoded,
     limits: Limits,
     pauses: Vec<Pause>,
@@ -48,19 +69,20 @@ struct Limits {
     stop: Option<Timestamp>,
 }
 
-struct Lane {
+struct Lane<S> {
+    number: usize,
     model: ModelRef,
     is_named: bool,
     arrivals: Arrivals<Vec<u8>>,
     decoder: Box<dyn Decoder>,
     clock: ClockModel,
     view: FieldOfView,
-    cutter: SweepCutter,
+    sink: S,
     spare: Vec<Vec<u8>>,
     is_done: bool,
 }
 
-impl SweepReader {
+impl<S: Sink> Reader<S> {
     /// Prepares for the capture that `report` was made of.
     ///
     /// # Errors
@@ -79,7 +101,7 @@ impl SweepReader {
         Ok(Self {
             options: report.options.clone(),
             lanes,
-            ready: VecDeque::new(),
+            out: S::Out::default(),
             decoded: Decoded::default(),
             limits: Limits {
                 start: options.start,
@@ -89,7 +111,7 @@ impl SweepReader {
         })
     }
 
-    /// Takes the next datagram; ask [`SweepReader::pop`] afterwards.
+    /// Takes the next datagram.
     pub fn push(&mut self, datagram: &Datagram<'_>) {
         let key = self.options.key(datagram);
         let Some(lane) = self.lanes.get_mut(&key).filter(|lane| !lane.is_done) else {
@@ -100,21 +122,11 @@ impl SweepReader {
         }
         let mut step = Step {
             decoded: &mut self.decoded,
-            ready: &mut self.ready,
+            out: &mut self.out,
             limits: self.limits,
             pauses: &self.pauses,
         };
         lane.push(datagram, &mut step);
-    }
-
-    /// The next complete sweep.
-    pub fn pop(&mut self) -> Option<Sweep> {
-        self.ready.pop_front()
-    }
-
-    /// Whether [`SweepReader::pop`] would give a sweep.
-    pub fn has_ready(&self) -> bool {
-        !self.ready.is_empty()
     }
 
     /// Whether all lidars have passed the end that was asked for, so that reading on is no use.
@@ -126,22 +138,14 @@ impl SweepReader {
     pub fn finish(&mut self) {
         let mut step = Step {
             decoded: &mut self.decoded,
-            ready: &mut self.ready,
+            out: &mut self.out,
             limits: self.limits,
             pauses: &self.pauses,
         };
-        let mut lanes: Vec<&mut Lane> = self.lanes.values_mut().collect();
-        lanes.sort_by_key(|lane| lane.cutter.lidar());
+        let mut lanes: Vec<&mut Lane<S>> = self.lanes.values_mut().collect();
+        lanes.sort_by_key(|lane| lane.number);
         for lane in lanes {
             lane.finish(&mut step);
-        }
-    }
-
-    /// Gives the memory of a sweep back for the next ones of its lidar.
-    pub fn recycle(&mut self, lidar: usize, cloud: PointCloud<Sensor>) {
-        let mut lanes = self.lanes.values_mut();
-        if let Some(lane) = lanes.find(|lane| lane.cutter.lidar() == lidar) {
-            lane.cutter.recycle(cloud);
         }
     }
 
@@ -157,27 +161,28 @@ impl SweepReader {
 }
 
 /// What a lane borrows of the reader.
-struct Step<'a> {
+struct Step<'a, Out> {
     decoded: &'a mut Decoded,
-    ready: &'a mut VecDeque<Sweep>,
+    out: &'a mut Out,
     limits: Limits,
     pauses: &'a [Pause],
 }
 
-impl Lane {
+impl<S: Sink> Lane<S> {
     fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, InvalidValue> {
         let own = options.beams.iter().find(|(lidar, _)| *lidar == number);
         let beams = own.map_or_else(|| info.model.beams(), |(_, beams)| beams.clone());
-        let cut_rad = options.cut_rad.get(number).copied().unwrap_or(0.0);
+        let cut_rad = options.cut_azimuth_rad.get(number).copied().unwrap_or(0.0);
         let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
         Ok(Self {
+            number,
             model: info.model,
             is_named: info.is_named,
             arrivals: Arrivals::new(info.model),
             decoder: info.model.decoder(&beams)?,
             clock: info.clock.clone(),
             view: info.view.clone(),
-            cutter: SweepCutter::new(number, cut_rad, visible_rad),
+            sink: S::new(number, cut_rad, visible_rad),
             spare: Vec::new(),
             is_done: false,
         })
@@ -191,7 +196,7 @@ impl Lane {
         }
     }
 
-    fn push(&mut self, datagram: &Datagram<'_>, step: &mut Step<'_>) {
+    fn push(&mut self, datagram: &Datagram<'_>, step: &mut Step<'_, S::Out>) {
         let payload = datagram.payload;
         let Some(head) = self.model.head(payload) else {
             return;
@@ -212,14 +217,14 @@ impl Lane {
         self.drain(step);
     }
 
-    fn drain(&mut self, step: &mut Step<'_>) {
+    fn drain(&mut self, step: &mut Step<'_, S::Out>) {
         while let Some((ordered, payload)) = self.arrivals.pop() {
             self.take(&ordered, &payload, step);
             self.spare.push(payload);
         }
     }
 
-    fn take(&mut self, ordered: &Ordered, payload: &[u8], step: &mut Step<'_>) {
+    fn take(&mut self, ordered: &Ordered, payload: &[u8], step: &mut Step<'_, S::Out>) {
         let ticket = &ordered.ticket;
         let time = self.clock.utc(ordered.segment, ticket.device);
         if self.is_done || step.limits.stop.is_some_and(|stop| time >= stop) {
@@ -235,7 +240,7 @@ impl Lane {
             is_jump: ordered.is_jump,
         };
         if step.limits.start.is_some_and(|start| time < start) {
-            return self.cutter.skip(&placed);
+            return self.sink.skip(&placed);
         }
         step.decoded.clear();
         let place = Place {
@@ -243,12 +248,52 @@ impl Lane {
             packet: ticket.packet,
         };
         self.decoder.decode(payload, place, step.decoded);
-        self.cutter.push(&placed, step.decoded, step.ready);
+        self.sink.push(&placed, step.decoded, step.out);
     }
 
-    fn finish(&mut self, step: &mut Step<'_>) {
+    fn finish(&mut self, step: &mut Step<'_, S::Out>) {
         self.arrivals.flush();
         self.drain(step);
-        self.cutter.finish(step.ready);
+        self.sink.finish(step.out);
+    }
+}
+
+impl Reader<SweepCutter> {
+    /// The next complete sweep.
+    pub fn pop(&mut self) -> Option<Sweep> {
+        self.out.pop_front()
+    }
+
+    /// Whether [`Reader::pop`] would give a sweep.
+    pub fn has_ready(&self) -> bool {
+        !self.out.is_empty()
+    }
+
+    /// Gives the memory of a sweep back for the next ones of its lidar.
+    pub fn recycle(&mut self, lidar: usize, cloud: PointCloud<Sensor>) {
+        let mut lanes = self.lanes.values_mut();
+        if let Some(lane) = lanes.find(|lane| lane.number == lidar) {
+            lane.sink.recycle(cloud);
+        }
+    }
+}
+
+impl Sink for SweepCutter {
+    type Out = VecDeque<Sweep>;
+
+    fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self {
+        SweepCutter::new(lidar, cut_rad, visible_rad)
+    }
+
+    fn skip(&mut self, packet: &Placed) {
+        SweepCutter::skip(self, packet);
+    }
+
+    fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut Self::Out) {
+        SweepCutter::push(self, packet, decoded, out);
+    }
+
+    fn finish(&mut self, out: &mut Self::Out) {
+        SweepCutter::finish(self, out);
     }
 }

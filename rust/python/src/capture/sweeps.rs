@@ -122,7 +122,7 @@ impl SweepIterator {
     ) -> BorderResult<Self> {
         let options = SweepOptions {
             lidars: Some(lidars),
-            cut_rad,
+            cut_azimuth_rad: cut_rad,
             beams: Vec::new(),
             start: start_ns.map(Timestamp),
             stop: stop_ns.map(Timestamp),
