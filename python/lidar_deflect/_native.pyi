@@ -45,6 +45,7 @@ def scan_capture(
     paths: Sequence[Path],
     *,
     sensors: Sequence[tuple[str, str]],
+    units: Sequence[tuple[str | None, str, bytes, bool]],
     progress: Callable[[int, int], None] | None = None,
 ) -> CaptureScan: ...
 def sensor_models() -> list[tuple[str, str]]: ...

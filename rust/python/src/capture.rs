@@ -10,8 +10,8 @@ mod sweeps;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use lidar_deflect_core::packet;
-use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, Source};
+use lidar_deflect_core::packet::{self, unit::UnitFile};
+use lidar_deflect_core::stream::{Given, Scan, ScanOptions, ScanReport, Source};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -62,14 +62,16 @@ impl CaptureScan {
 
 /// Reads a capture once and tells what is in it.
 ///
-/// `sensors` are pairs of a source and a model id; `progress` is called with bytes done and total.
+/// `sensors` are pairs of a source and a model id; `units` are files of single units: source or none,
+/// name, content, and whether the user named it; `progress` is called with bytes done and total.
 #[pyfunction]
-#[pyo3(signature = (paths, *, sensors, progress=None))]
+#[pyo3(signature = (paths, *, sensors, units, progress=None))]
 #[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 fn scan_capture(
     py: Python<'_>,
     paths: Vec<PathBuf>,
     sensors: Vec<(String, String)>,
+    units: Vec<(Option<String>, String, Vec<u8>, bool)>,
     progress: Option<Py<PyAny>>,
 ) -> BorderResult<CaptureScan> {
     let mut options = ScanOptions::default();
@@ -77,9 +79,19 @@ fn scan_capture(
         let named = (Source::parse(source)?, packet::model(id)?);
         options.models.push(named);
     }
+    for (source, name, content, is_named) in units {
+        options.units.push(Given {
+            source: source.as_deref().map(Source::parse).transpose()?,
+            file: UnitFile::new(name, content),
+            is_named,
+        });
+    }
     let (mut report, mut files) = scan_once(py, &paths, options, progress.as_ref())?;
     if let Some(options) = report.split() {
         (report, files) = scan_once(py, &paths, options, progress.as_ref())?;
+    }
+    if !report.lidars.is_empty() {
+        report.check_units()?;
     }
     Ok(CaptureScan {
         paths,

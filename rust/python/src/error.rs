@@ -1,6 +1,6 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
-use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue};
+use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue, ReadError, UnitError};
 use lidar_deflect_core::register::wall::WallError;
 use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
@@ -46,6 +46,8 @@ macro_rules! translate {
 translate! {
     CaptureError => "CaptureError",
     InvalidValue => "InvalidValueError",
+    ReadError => "InvalidValueError",
+    UnitError => "InvalidValueError",
     WallError => "CalibrationError",
 }
 

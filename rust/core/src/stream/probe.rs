@@ -9,6 +9,29 @@ const ENOUGH: usize = 32;
 /// The packet period of the data may differ from the model's by this share.
 const PERIOD_TOLERANCE: f64 = 0.25;
 
+/// What a stream is.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// The likeliest model.
+    pub model: ModelRef,
+    /// Ids of the others that it may be as well.
+    pub candidates: Vec<&'static str>,
+}
+
+impl Choice {
+    fn one(model: ModelRef) -> Self {
+        let candidates = model.candidates().to_vec();
+        Self { model, candidates }
+    }
+
+    fn among(models: &[ModelRef]) -> Option<Self> {
+        let (model, others) = models.split_first()?;
+        let mut choice = Self::one(*model);
+        choice.candidates.extend(others.iter().map(|other| other.id()));
+        Some(choice)
+    }
+}
+
 /// Data packets of a stream that is not decided yet.
 #[derive(Debug, Default)]
 pub struct Probe {
@@ -48,15 +71,27 @@ impl Probe {
     }
 
     /// The model; `None` where no packet came or none of the models fits.
-    pub fn decide(&self) -> Option<ModelRef> {
-        if self.packets.is_empty() || self.named.is_some() {
-            return self.named.filter(|_| !self.packets.is_empty());
-        }
+    ///
+    /// A model whose bytes are not believed has to have the packet period of the data, and of several
+    /// that do the nearest is taken. Where there are too few packets to tell, all are candidates.
+    pub fn decide(&self) -> Option<Choice> {
         let (_, first) = self.packets.first()?;
-        claimants(first).find(|model| {
-            let is_sure = self.packets.iter().all(|(_, p)| model.is_sure(p));
-            is_sure || self.has_period_of(*model)
-        })
+        if let Some(model) = self.named {
+            return Some(Choice::one(model));
+        }
+        let claimants: Vec<ModelRef> = claimants(first).collect();
+        let is_sure = |model: &&ModelRef| self.packets.iter().all(|(_, p)| model.is_sure(p));
+        if let Some(model) = claimants.iter().find(is_sure) {
+            return Some(Choice::one(*model));
+        }
+        let errors: Vec<Option<f64>> = claimants.iter().map(|m| self.period_error(*m)).collect();
+        if errors.iter().all(Option::is_none) {
+            return Choice::among(&claimants);
+        }
+        let known = claimants.iter().zip(&errors).filter_map(|(model, error)| Some((*model, (*error)?)));
+        let fitting = known.filter(|(_, error)| *error < PERIOD_TOLERANCE);
+        let nearest = fitting.min_by(|(_, one), (_, other)| one.total_cmp(other));
+        nearest.map(|(model, _)| Choice::one(model))
     }
 
     /// Why nothing was decided although packets were claimed.
@@ -74,13 +109,12 @@ impl Probe {
         self.packets
     }
 
-    fn has_period_of(&self, model: ModelRef) -> bool {
-        let head = self.packets.iter().find_map(|(_, p)| model.head(p));
-        let (Some(found_ns), Some(head)) = (self.period_ns(model), head) else {
-            return true; // too few packets to tell
-        };
+    /// How far the packet period of the data is off the model's, as a share; `None` where there are too
+    /// few packets to tell.
+    fn period_error(&self, model: ModelRef) -> Option<f64> {
+        let head = self.packets.iter().find_map(|(_, p)| model.head(p))?;
         let period_ns = model.period_ns(head.return_mode) as f64;
-        (found_ns / period_ns - 1.0).abs() < PERIOD_TOLERANCE
+        Some((self.period_ns(model)? / period_ns - 1.0).abs())
     }
 
     /// Median step of device time; `None` for fewer than three steps.

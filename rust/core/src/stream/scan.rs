@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::arrivals::{Arrival, Arrivals, Gap, Ordered, Ticket, mark};
-use super::probe::Probe;
+use super::probe::{Choice, Probe};
 use super::report::{OtherStream, Pause, PositionFacts, ScanReport, Second, StreamInfo};
 use super::{ScanOptions, StreamKey};
 use crate::capture::Datagram;
@@ -12,6 +12,7 @@ use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
 use crate::packet::velodyne::position::{Position, Pps};
+use crate::packet::unit::{Calibration, Gather, UnitFile};
 use crate::packet::{ModelRef, PacketKind, Tally, closest, companion};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 
@@ -55,6 +56,8 @@ struct Stream {
     payload_len: usize,
     closest: Option<(&'static str, String)>,
     position: Option<PositionFacts>,
+    /// The last packet that describes a unit.
+    metadata: Option<UnitFile>,
 }
 
 #[derive(Debug)]
@@ -67,6 +70,8 @@ enum State {
 struct Lidar {
     model: ModelRef,
     is_named: bool,
+    candidates: Vec<&'static str>,
+    gather: Option<Box<dyn Gather>>,
     arrivals: Arrivals<Tally>,
     clock: ClockEstimator,
     view: FieldOfView,
@@ -148,7 +153,8 @@ impl Scan {
                     drops.add("foreign", stream.foreign);
                     lidar.add_drops(&mut drops);
                     let position = self.position_of(key);
-                    lidars.extend(lidar.describe(*key, stream.foreign, position));
+                    let info = lidar.describe(*key, stream.foreign, position);
+                    lidars.extend(info.map(|info| self.with_unit(info, lidar)));
                 }
             }
         }
@@ -167,6 +173,18 @@ impl Scan {
             pauses: self.shared.pauses,
             options: self.options,
         }
+    }
+
+    /// Adds what is known of the unit: the user's files, else what its own packets say.
+    fn with_unit(&self, mut info: StreamInfo, lidar: &Lidar) -> StreamInfo {
+        let mut files = self.options.unit_files(&info.key);
+        let same = self.streams.iter().filter(|(other, _)| other.address == info.key.address);
+        files.extend(same.filter_map(|(_, stream)| stream.metadata.clone()));
+        files.extend(lidar.gather.as_ref().and_then(|gather| gather.file()));
+        files.retain(|file| info.model.takes(file));
+        info.calibration = info.model.fit(&files).map(|fitted| fitted.calibration);
+        info.unit = files;
+        info
     }
 
     /// Position packets from a lidar's address, to whatever port.
@@ -191,6 +209,7 @@ impl Stream {
             payload_len: datagram.payload.len(),
             closest: None,
             position: None,
+            metadata: None,
         }
     }
 
@@ -203,7 +222,7 @@ impl Stream {
                 if lidar.is_data(payload) {
                     lidar.count_port(datagram.source.port());
                     lidar.push(datagram.time, payload, shared);
-                } else if !self.take_position(datagram) {
+                } else if !self.take_companion(datagram) {
                     self.foreign += 1;
                     self.note_foreign(datagram.time, shared);
                 }
@@ -213,7 +232,7 @@ impl Stream {
                     if probe.is_enough() {
                         self.decide(shared);
                     }
-                } else if !self.take_position(datagram) {
+                } else if !self.take_companion(datagram) {
                     self.foreign += 1;
                     if self.closest.is_none() {
                         let near = closest(payload);
@@ -224,10 +243,21 @@ impl Stream {
         }
     }
 
-    fn take_position(&mut self, datagram: &Datagram<'_>) -> bool {
-        if companion(datagram.payload) != Some(PacketKind::Position) {
-            return false;
+    /// Takes what is not data and yet of a lidar.
+    fn take_companion(&mut self, datagram: &Datagram<'_>) -> bool {
+        match companion(datagram.payload) {
+            Some(PacketKind::Position) => self.take_position(datagram),
+            Some(PacketKind::Metadata) => {
+                let name = format!("packets to port {}", datagram.destination.port());
+                self.metadata = Some(UnitFile::new(name, datagram.payload));
+                true
+            }
+            Some(PacketKind::Inertial) => true,
+            _ => false,
         }
+    }
+
+    fn take_position(&mut self, datagram: &Datagram<'_>) -> bool {
         let Some(position) = Position::new(datagram.payload) else {
             return false;
         };
@@ -256,10 +286,10 @@ impl Stream {
         let State::Probing(probe) = &mut self.state else {
             return;
         };
-        let Some(model) = probe.decide() else { return };
+        let Some(choice) = probe.decide() else { return };
         let is_named = probe.is_named();
         let probe = std::mem::take(probe);
-        let mut lidar = Box::new(Lidar::new(model, is_named));
+        let mut lidar = Box::new(Lidar::new(choice, is_named));
         for (arrival, payload) in probe.into_packets() {
             if lidar.is_data(&payload) {
                 lidar.push(arrival, &payload, shared);
@@ -300,10 +330,13 @@ impl Stream {
 }
 
 impl Lidar {
-    fn new(model: ModelRef, is_named: bool) -> Self {
+    fn new(choice: Choice, is_named: bool) -> Self {
+        let model = choice.model;
         Self {
             model,
             is_named,
+            candidates: choice.candidates,
+            gather: model.gather(),
             arrivals: Arrivals::new(model),
             clock: ClockEstimator::default(),
             view: FieldOfView::default(),
@@ -345,6 +378,9 @@ impl Lidar {
             self.broken += 1;
             return;
         };
+        if let Some(gather) = &mut self.gather {
+            gather.take(payload);
+        }
         let tally = self.model.tally(payload);
         let (ticket, what) = self.arrivals.offer(arrival, &head, mark(payload), || tally);
         match what {
@@ -486,6 +522,9 @@ impl Lidar {
             key,
             model: self.model,
             is_named: self.is_named,
+            candidates: self.candidates.clone(),
+            unit: Vec::new(),
+            calibration: Ok(Calibration::Factory),
             return_mode: last.ticket.head.return_mode.name(),
             rpm: self.turned_rad / std::f64::consts::TAU / minutes.max(f64::MIN_POSITIVE),
             counts: self.counts,

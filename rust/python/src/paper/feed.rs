@@ -60,7 +60,7 @@ impl FramePlan {
             report: Arc::clone(&scan.report),
             options: SweepOptions {
                 lidars: Some(lidars.clone()),
-                cut_rad: cuts(&lidars, &cut_azimuth_deg),
+                cut_azimuth_rad: cuts(&lidars, &cut_azimuth_deg),
                 start: Some(Timestamp(start_ns)),
                 stop: Some(Timestamp(stop_ns)),
                 ..SweepOptions::default()
