@@ -7,6 +7,7 @@
 pub mod aim;
 pub mod beams;
 pub mod echoes;
+pub mod hesai;
 pub mod unit;
 pub mod velodyne;
 
@@ -31,6 +32,14 @@ pub static MODELS: &[ModelRef] = &[
     &velodyne::vls128::VLS128,
     &velodyne::hdl64e::HDL64E_S3,
     &velodyne::hdl64e::HDL64E_S2,
+    &hesai::pandar::PANDAR40P,
+    &hesai::pandar::PANDAR40AC,
+    &hesai::pandar::PANDAR64,
+    &hesai::xt::XT16,
+    &hesai::xt::XT32,
+    &hesai::xt::XT32M2X,
+    &hesai::xt::QT64,
+    &hesai::qt128::QT128,
 ];
 
 /// What the library must know of one sensor model.

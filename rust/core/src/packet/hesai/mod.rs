@@ -1,0 +1,12 @@
+//! Hesai: blocks of channels between a header and a tail, little endian.
+//!
+//! Source: the manuals of the models and the maker's development kit.
+
+pub mod date;
+pub mod layout;
+mod modes;
+pub mod pandar;
+pub mod qt128;
+pub mod rotating;
+pub mod unit;
+pub mod xt;
