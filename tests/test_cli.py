@@ -219,3 +219,14 @@ def test_an_output_that_exists_is_refused_before_work_begins(tmp_path: Path) -> 
     with pytest.raises(OutputError):
         options.free(tmp_path, overwrite=False)
     assert options.free(tmp_path, overwrite=True) == tmp_path
+
+
+def test_only_named_lidars_and_sections_stay_with_what_belongs_to_them() -> None:
+    whole = config.load(EVERY_KEY, check_files=False)
+    one = units.narrowed(whole, ["192.168.1.202"], None)
+    assert [lidar.id for lidar in one.lidars] == ["L2"]
+    assert one.distance == ()
+    assert one.wires == whole.wires
+    assert units.narrowed(whole, None, ["S84"]).sections == whole.sections
+    with pytest.raises(Exception, match="expected one of S84"):
+        units.narrowed(whole, None, ["S85"])

@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 import folders
-from lidar_deflect import comparison, holds, steps, tables
+from lidar_deflect import comparison, config, holds, steps, tables
 from lidar_deflect.comparison import ComparisonWarning, error_percent
 from lidar_deflect.errors import InvalidValueError, ResultError, ResultNotFoundError
 
@@ -216,6 +216,19 @@ def test_a_wire_is_held_against_what_it_would_have_read_and_against_the_total(
     total = at(frame, "100 %", "tip", "W110", "total")
     assert total["measured_m"] == pytest.approx(np.linalg.norm([6.07, 0.71, 0.21]))
     assert total["reference_m"] == row["reference_m"]
+
+
+def test_a_checked_configuration_serves_as_well_as_a_mapping(tmp_path: Path) -> None:
+    folder = folders.write(tmp_path / "r", folders.deflection(folders.TIP))
+    path = wire(tmp_path / "wire.csv")
+    (tmp_path / "test.toml").write_text(
+        '[blade]\nlength_m = 110.0\n[[lidars]]\nid = "L1"\n'
+        '[[sections]]\nname = "tip"\ns_m = 110.0\n'
+        '[[wires]]\nname = "W110"\nsection = "tip"\nanchor_m = [20.0, -7.0, 110.0]\n'
+        'file = "wire.csv"\ncolumn = "s110_mm"\n'
+    )
+    checked = comparison.compare(folder, path, config=config.load(tmp_path / "test.toml"))
+    assert checked.equals(comparison.compare(folder, path, config=WIRE_CONFIG))
 
 
 def test_a_wire_counts_from_its_own_reading_in_the_unloaded_hold(tmp_path: Path) -> None:

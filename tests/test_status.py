@@ -52,12 +52,12 @@ def test_a_refused_frame_is_missing_with_its_reason():
     assert graded(overhead, failure) == (MISSING, "overhead")
 
 
-def test_sections_beyond_the_last_line_are_extrapolated():
-    status = np.array([[OK, OK, MISSING]], np.uint8)
-    reason = np.full((1, 3), None, dtype=object)
-    extrapolate(status, reason, np.array([[100.0, 106.0, np.nan]]), np.array([104.0]))
-    assert status.tolist() == [[OK, EXTRAPOLATED, MISSING]]
-    assert reason.tolist() == [[None, "beyond_last_line", None]]
+def test_sections_outside_of_the_scan_lines_are_extrapolated():
+    status = np.array([[OK, OK, OK, MISSING]], np.uint8)
+    reason = np.full((1, 4), None, dtype=object)
+    extrapolate(status, reason, np.array([[80.0, 100.0, 106.0, np.nan]]), np.array([[84, 104.0]]))
+    assert status.tolist() == [[EXTRAPOLATED, OK, EXTRAPOLATED, MISSING]]
+    assert reason.tolist() == [["before_first_line", None, "beyond_last_line", None]]
 
 
 def test_overhead_rows_are_filled_between_and_never_beyond():

@@ -14,16 +14,16 @@ __all__ = [
     "DistancePass",
     "FrameParams",
     "FramePlan",
-    "Simulation",
     "PointIterator",
+    "Simulation",
     "Sweep",
     "SweepIterator",
     "__version__",
     "check_captures",
+    "cut_capture",
     "reference_blades",
     "rotation_about_up",
     "rotation_onto",
-    "cut_capture",
     "scan_capture",
     "sensor_models",
     "yaw_from_wall",
@@ -171,6 +171,7 @@ def yaw_from_wall(
     yaw_range_rad: float,
     min_height_m: float,
 ) -> tuple[float, float, int]: ...
+
 @final
 class FramePlan:
     def __new__(

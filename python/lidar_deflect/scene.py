@@ -32,17 +32,21 @@ UP_TO_HALF_TURN = Annotated[float, Field(gt=0, lt=90)]
 class Blade(Model):
     """The blade: whose drawing, how clamped, how well built."""
 
-    reference: str = Field("iea15-110m", description="name of a published reference blade")
+    reference: str = Field(default="iea15-110m", description="name of a published reference blade")
     length_m: Positive | None = Field(
-        None, description="stretched to this length; default: its own"
+        default=None, description="stretched to this length; default: its own"
     )
-    leading_edge: Direction = Field((-1.0, 0.0, 0.0), description="where it points at zero twist")
-    suction_side: Direction = Field((0.0, -1.0, 0.0), description="where it faces at zero twist")
-    chord_percent: NotNegative = Field(0.3, description="sigma of the built chord")
-    setting_deg: NotNegative = Field(0.15, description="sigma of the setting angle")
-    prebend_percent: NotNegative = Field(2.0, description="sigma of the built prebend")
-    stiffness_percent: NotNegative = Field(5.0, description="sigma of each stiffness")
-    waves_mm: NotNegative = Field(2.0, description="sigma of the surface about the drawing")
+    leading_edge: Direction = Field(
+        default=(-1.0, 0.0, 0.0), description="where it points at zero twist"
+    )
+    suction_side: Direction = Field(
+        default=(0.0, -1.0, 0.0), description="where it faces at zero twist"
+    )
+    chord_percent: NotNegative = Field(default=0.3, description="sigma of the built chord")
+    setting_deg: NotNegative = Field(default=0.15, description="sigma of the setting angle")
+    prebend_percent: NotNegative = Field(default=2.0, description="sigma of the built prebend")
+    stiffness_percent: NotNegative = Field(default=5.0, description="sigma of each stiffness")
+    waves_mm: NotNegative = Field(default=2.0, description="sigma of the surface about the drawing")
 
 
 class Saddle(Model):
@@ -51,7 +55,7 @@ class Saddle(Model):
     s_m: Positive = Field(description="arc length of the saddle")
     force_kn: Number = Field(description="pull at 100 %")
     lever_m: tuple[Number, Number] = Field(
-        (0.0, 0.0),
+        default=(0.0, 0.0),
         description="cable's fixing from the axis, along the chord and to the suction side",
     )
 
@@ -59,21 +63,27 @@ class Saddle(Model):
 class Loading(Model):
     """Load steps, and how the saddles pull."""
 
-    direction: Direction = Field((1.0, 0.0, 0.0), description="of the pull")
-    follower: Flag = Field(False, description="the pull turns with the section")
-    levels_percent: tuple[NotNegative, ...] = Field((0.0, 40.0, 70.0, 100.0, 0.0), min_length=1)
-    hold_s: Positive = Field(3.6, description="seconds at each level")
-    ramp_s: Positive = Field(1.2, description="seconds between levels")
-    winch_m: Number = Field(42.0, description="distance of the winches along the load direction")
-    winch_height_m: Number = Field(0.4, description="height of the winches above the ground")
-    root_mrad: Point = Field((0.0, 0.0, 0.0), description="rotation of the root at 100 %")
+    direction: Direction = Field(default=(1.0, 0.0, 0.0), description="of the pull")
+    follower: Flag = Field(default=False, description="the pull turns with the section")
+    levels_percent: tuple[NotNegative, ...] = Field(
+        default=(0.0, 40.0, 70.0, 100.0, 0.0), min_length=1
+    )
+    hold_s: Positive = Field(default=3.6, description="seconds at each level")
+    ramp_s: Positive = Field(default=1.2, description="seconds between levels")
+    winch_m: Number = Field(
+        default=42.0, description="distance of the winches along the load direction"
+    )
+    winch_height_m: Number = Field(
+        default=0.4, description="height of the winches above the ground"
+    )
+    root_mrad: Point = Field(default=(0.0, 0.0, 0.0), description="rotation of the root at 100 %")
 
 
 class Sway(Model):
     """Swaying in one mode."""
 
     direction: Direction = Field(description="of the tip")
-    order: Literal[1, 2] = Field(1, description="number of the bending mode")
+    order: Literal[1, 2] = Field(default=1, description="number of the bending mode")
     frequency_hz: Positive
     amplitude_mm: NotNegative = Field(description="at the tip")
     phase_deg: Number = 0.0
@@ -82,20 +92,22 @@ class Sway(Model):
 class Ground(Model):
     """The ground: a sloped plane with rough heights on it."""
 
-    height_m: Number = Field(-7.2, description="at x = z = 0")
+    height_m: Number = Field(default=-7.2, description="at x = z = 0")
     slope_x: Number = 0.018
     slope_z: Number = -0.012
-    roughness_mm: NotNegative = Field(15.0, description="sigma of the heights")
-    correlation_m: Positive = Field(0.8, description="distance over which heights are alike")
+    roughness_mm: NotNegative = Field(default=8.0, description="sigma of the heights")
+    correlation_m: Positive = Field(
+        default=0.8, description="distance over which heights are alike"
+    )
 
 
 class Wall(Model):
     """A wall that stands upright along the blade."""
 
-    x_m: Number = Field(-24.2, description="at z = 0")
-    slope: Number = Field(0.0225, description="change of x per metre of z")
+    x_m: Number = Field(default=-24.2, description="at z = 0")
+    slope: Number = Field(default=0.0225, description="change of x per metre of z")
     z_m: Range = (60.0, 140.0)
-    top_m: Number = Field(3.0, description="height of its top")
+    top_m: Number = Field(default=0.0, description="height of its top")
 
 
 class Box(Model):
@@ -108,9 +120,11 @@ class Box(Model):
 class Clock(Model):
     """A lidar's clock against UTC."""
 
-    offset_ms: Number = Field(0.0, description="ahead of UTC at the start")
+    offset_ms: Number = Field(default=0.0, description="ahead of UTC at the start")
     drift_ppm: Number = 0.0
-    locked: Flag = Field(False, description="position packets tell of a receiver that holds it")
+    locked: Flag = Field(
+        default=False, description="position packets tell of a receiver that holds it"
+    )
 
 
 class Lidar(Model):
@@ -139,43 +153,52 @@ class Lidar(Model):
 class Sensors(Model):
     """Mounting, optics and electronics of all lidars."""
 
-    tilt_deg: NotNegative = Field(2.5, description="sigma of the tilt about each axis")
-    beam_mrad: Positive = Field(1.0, description="full angle of a beam")
-    noise_mm: NotNegative = Field(8.0, description="sigma of one range")
-    channel_offset_mm: NotNegative = Field(6.0, description="sigma of the offset of each laser")
-    unit_offset_mm: NotNegative = Field(5.0, description="sigma of the offset of each unit")
-    incidence_bias_mm: Number = Field(0.0, description="error times (1 / cos(incidence) - 1)")
-    merge_m: NotNegative = Field(0.45, description="echoes closer than this melt into one")
-    range_at_10_percent_m: Positive = Field(60.0, description="95 % of echoes of a 10 % surface")
+    tilt_deg: NotNegative = Field(default=2.5, description="sigma of the tilt about each axis")
+    beam_mrad: Positive = Field(default=1.0, description="full angle of a beam")
+    noise_mm: NotNegative = Field(default=14.0, description="sigma of one range")
+    channel_offset_mm: NotNegative = Field(
+        default=7.0, description="sigma of the offset of each laser"
+    )
+    unit_offset_mm: NotNegative = Field(default=4.0, description="sigma of the offset of each unit")
+    incidence_bias_mm: Number = Field(
+        default=0.0, description="error times (1 / cos(incidence) - 1)"
+    )
+    dropout: Probability = Field(default=0.01, description="echoes lost whatever they meet")
+    merge_m: NotNegative = Field(default=0.45, description="echoes closer than this melt into one")
+    range_at_10_percent_m: Positive = Field(
+        default=60.0, description="95 % of echoes of a 10 % surface"
+    )
     max_range_m: Annotated[float, Field(gt=1, le=130)] = 100.0
     grazing_deg: UP_TO_HALF_TURN = Field(
-        82.0, description="incidence that loses half of the echoes"
+        default=88.0, description="incidence that loses half of the echoes"
     )
 
 
 class Network(Model):
     """What happens between lidars and recording."""
 
-    loss: Probability = Field(0.002, description="of a packet by itself")
-    bursts_per_s: NotNegative = Field(0.05, description="bursts of loss per lidar")
-    burst_packets: NotNegative = Field(6.0, description="mean length of a burst")
+    loss: Probability = Field(default=0.002, description="of a packet by itself")
+    bursts_per_s: NotNegative = Field(default=0.05, description="bursts of loss per lidar")
+    burst_packets: NotNegative = Field(default=6.0, description="mean length of a burst")
     duplicates: Probability = 0.0005
-    late: Probability = Field(0.0005, description="arrives behind its successors, within 30 ms")
-    jitter_us: NotNegative = Field(35.0, description="mean of the random delay")
-    foreign_hz: NotNegative = Field(7.5, description="datagrams of others, of each kind")
-    position_hz: NotNegative = Field(10.0, description="position packets per lidar")
+    late: Probability = Field(
+        default=0.0005, description="arrives behind its successors, within 30 ms"
+    )
+    jitter_us: NotNegative = Field(default=35.0, description="mean of the random delay")
+    foreign_hz: NotNegative = Field(default=7.5, description="datagrams of others, of each kind")
+    position_hz: NotNegative = Field(default=10.0, description="position packets per lidar")
 
 
 class Survey(Model):
     """What surveyors and channels would tell."""
 
-    position_mm: NotNegative = Field(5.0, description="sigma of surveyed points")
+    position_mm: NotNegative = Field(default=5.0, description="sigma of surveyed points")
     ground_points: Annotated[int, Field(ge=0, le=600)] = 24
     wall_points: Annotated[int, Field(ge=0, le=600)] = 8
-    wire_mm: NotNegative = Field(2.0, description="noise of a draw wire")
-    load_percent: NotNegative = Field(0.08, description="noise of the load channel")
-    rate_hz: Positive = Field(10.0, description="of load and wires")
-    prediction_percent: NotNegative = Field(1.0, description="sigma of the prediction")
+    wire_mm: NotNegative = Field(default=2.0, description="noise of a draw wire")
+    load_percent: NotNegative = Field(default=0.08, description="noise of the load channel")
+    rate_hz: Positive = Field(default=10.0, description="of load and wires")
+    prediction_percent: NotNegative = Field(default=1.0, description="sigma of the prediction")
 
 
 class Scene(Model):
@@ -188,7 +211,7 @@ class Scene(Model):
     loading: Loading = Loading()
     saddles: tuple[Saddle, ...] = ()
     show_saddles: Flag = True
-    cable_mm: NotNegative = Field(24.0, description="diameter of the cables; 0 = none")
+    cable_mm: NotNegative = Field(default=24.0, description="diameter of the cables; 0 = none")
     sways: tuple[Sway, ...] = ()
     ground: Ground = Ground()
     wall: Wall | None = None
@@ -196,7 +219,7 @@ class Scene(Model):
     lidars: tuple[Lidar, ...] = Field(min_length=1)
     sensors: Sensors = Sensors()
     network: Network = Network()
-    sections_m: tuple[Positive, ...] = Field((84.0, 100.0, 110.0), min_length=1)
+    sections_m: tuple[Positive, ...] = Field(default=(84.0, 100.0, 110.0), min_length=1)
     survey: Survey = Survey()
 
     @model_validator(mode="after")
@@ -272,7 +295,7 @@ def _lidars(x_m: float, ground: Ground, first_z_m: float, step_m: float) -> list
             "address": f"192.168.1.{201 + i}",
             "position_m": (
                 x_m,
-                round(ground.height_m + ground.slope_x * x_m + ground.slope_z * z + 1.4, 3),
+                round(ground.height_m + ground.slope_x * x_m + ground.slope_z * z + 1.2, 3),
                 z,
             ),
         }
@@ -295,11 +318,13 @@ def demo(seed: int = 1) -> Scene:
     """
     ground = Ground()
     lidars = _lidars(3.0, ground, 86.0, 7.8)
+    # One sensor without a time server: on since three minutes ago, its clock gaining.
+    lidars[2]["clock"] = {"offset_ms": -1_219_432.1, "drift_ppm": 14.0}
     return Scene.from_document(
         {
             "id": "demo-edge",
             "seed": seed,
-            "saddles": _saddles(1000.0, (0.05, 0.02)),
+            "saddles": _saddles(1000.0, (0.02, 0.01)),
             "sways": _sways(8.0, 6.0),
             "wall": {},
             "boxes": _boxes(),
@@ -317,7 +342,7 @@ def flapwise(seed: int = 1) -> Scene:
             "seed": seed,
             "blade": {"leading_edge": "+y", "suction_side": "+x"},
             "loading": {"levels_percent": (0.0, 100.0), "hold_s": 4.0, "ramp_s": 12.0},
-            "saddles": _saddles(2500.0, (0.05, 0.02)),
+            "saddles": _saddles(2500.0, (0.02, 0.01)),
             "sways": _sways(12.0, 5.0),
             "ground": ground.model_dump(),
             "wall": {},

@@ -107,7 +107,7 @@ def _write_truth(
     scene: Scene, native: _native.Simulation, folder: Path, threads: int | None
 ) -> None:
     offsets_ns = np.arange(0, round(native.duration_s * 1e9) + 1, TRUTH_STEP_NS)
-    times_s = offsets_ns * 1e-9
+    times_s = np.asarray(offsets_ns * 1e-9, dtype=np.float64)
     rows = native.truth(scene.sections_m, times_s, threads=threads).reshape(-1, 13)
     count = len(scene.sections_m)
     time = pl.Series(np.repeat(_start_ns(scene) + offsets_ns, count))
@@ -279,6 +279,7 @@ def _plan(scene: Scene) -> dict[str, Any]:
         "optics": {
             "beam_rad": sensors.beam_mrad * 1e-3,
             "noise_m": sensors.noise_mm * 1e-3,
+            "dropout": sensors.dropout,
             "merge_m": sensors.merge_m,
             "range_at_10_percent_m": sensors.range_at_10_percent_m,
             "max_range_m": sensors.max_range_m,

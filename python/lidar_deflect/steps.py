@@ -10,7 +10,10 @@ from lidar_deflect.holds import Hold
 SEEN = ("ok", "degraded")
 """Statuses of states that were measured."""
 
-_FILLED = ("interpolated", "extrapolated")
+TIERS = (("ok",), SEEN, ("interpolated", "extrapolated"))
+"""Statuses of the states that a hold averages: the first of these that are enough."""
+
+_ENOUGH = (0.5, 0.0, 0.0)  # share of the hold's states above which a tier is enough
 _COMPONENTS = (("dx_m", "dy_m", "dz_m"), ("dxr_m", "dyr_m", "dzr_m"))
 _TOTALS = ("d_m", "dr_m")
 
@@ -18,9 +21,10 @@ _TOTALS = ("d_m", "dr_m")
 def average(deflection: pl.DataFrame, holds: Sequence[Hold]) -> pl.DataFrame:
     """Average the deflection over each hold.
 
-    Measured states (`ok`, `degraded`) count; where a hold has none, filled ones (`interpolated`,
-    `extrapolated`) do and give the row their status. A step of which under half of the states were
-    measured is `degraded`, with the commonest reason. Total deflections are the norms of the
+    Where at least half of a hold's states are `ok`, those count alone; else `degraded` ones count
+    too; where a hold has neither, filled ones (`interpolated`, `extrapolated`) do and give the row
+    their status. A step of which under half of the states are `ok` is `degraded`, with the
+    commonest reason. Total deflections are the norms of the
     averaged components. Uncertainties are averaged, not divided by the root of the count: what a
     hold's states share does not average out.
 
@@ -75,10 +79,12 @@ def _one(deflection: pl.DataFrame, hold: Hold, section: tuple[str, float]) -> pl
 
 
 def _used(rows: pl.DataFrame) -> pl.DataFrame:
-    status = pl.col("status").cast(pl.String)
     placed = rows.filter(pl.col("x_m").is_not_null())
-    seen = placed.filter(status.is_in(SEEN))
-    return seen if seen.height else placed.filter(status.is_in(_FILLED))
+    for statuses, enough in zip(TIERS, _ENOUGH, strict=True):
+        tier = placed.filter(pl.col("status").cast(pl.String).is_in(statuses))
+        if tier.height and tier.height >= enough * rows.height:
+            return tier
+    return placed.clear()
 
 
 def _means() -> list[pl.Expr]:

@@ -9,6 +9,7 @@ def main() -> None:
         from lidar_deflect.cli.app import run
 
         code = run(sys.argv[1:])
-    except KeyboardInterrupt:
+    except KeyboardInterrupt:  # while the command line itself was still being loaded
+        sys.stderr.write("error[interrupted]: interrupted; nothing half-written is left\n")
         code = 130
     sys.exit(code)

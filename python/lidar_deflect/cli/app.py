@@ -21,7 +21,7 @@ from lidar_deflect.cli import (
     schema,
     simulate,
 )
-from lidar_deflect.cli.failure import INTERRUPTED, show
+from lidar_deflect.cli.failure import show
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -87,7 +87,9 @@ def run(arguments: Sequence[str]) -> int:
     except SystemExit as left:
         code = left.code
     interrupt.disarm()
-    return INTERRUPTED if interrupt.came and code else int(code or 0)
+    if interrupt.came and code:
+        return show(KeyboardInterrupt(), arguments)
+    return int(code or 0)
 
 
 class _Interrupt:

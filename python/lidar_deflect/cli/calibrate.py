@@ -11,6 +11,7 @@ from lidar_deflect.cli.options import (
     ConfigFile,
     From,
     Json,
+    Lidars,
     Overwrite,
     Quiet,
     Sensors,
@@ -22,7 +23,7 @@ from lidar_deflect.cli.options import (
     span,
 )
 from lidar_deflect.cli.talk import Talk
-from lidar_deflect.cli.units import overrides
+from lidar_deflect.cli.units import narrowed, overrides
 
 SCHEMA = "lidar-deflect.calibrate/1"
 
@@ -36,6 +37,7 @@ def calibrate(
     set_: Set = None,
     sensor: Sensors = None,
     beams: Beams = None,
+    lidar: Lidars = None,
     start: From = None,
     stop: To = None,
     overwrite: Overwrite = False,
@@ -54,6 +56,7 @@ def calibrate(
     from lidar_deflect.pipeline import Test
 
     test = Test.load(config, changes)
+    test = Test(narrowed(test.config, lidar, None), test.path)
     start_s, stop_s = span(start, stop, captures)
     with talk.progress("calibrating") as progress:
         calibration = test.calibrate(

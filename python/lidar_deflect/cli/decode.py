@@ -1,7 +1,8 @@
 """``lidar-deflect decode``: the points of a capture as a table or point cloud."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -10,6 +11,7 @@ from lidar_deflect.cli.options import (
     Captures,
     From,
     Json,
+    Lidars,
     Overwrite,
     Quiet,
     Sensors,
@@ -34,9 +36,7 @@ def decode(
             "--out", "-o", metavar="FILE", help="Kind by suffix: .parquet .csv .npz .ply .pcd .pcap"
         ),
     ] = Path("points.parquet"),
-    lidar: Annotated[
-        list[str] | None, typer.Option("--lidar", help="Only this lidar; repeatable.")
-    ] = None,
+    lidar: Lidars = None,
     sensor: Sensors = None,
     beams: Beams = None,
     start: From = None,
@@ -71,4 +71,9 @@ def decode(
             threads=threads,
         )
     document = {"schema": SCHEMA, "out": str(out), **counts}
-    talk.result(document, f"{out}: {grouped(counts['points'])} points")
+    talk.result(document, f"{out}: {_counted(counts)}")
+
+
+def _counted(counts: Mapping[str, Any]) -> str:
+    merged = f", {grouped(counts['merged'])} merged" if counts["merged"] else ""
+    return f"{grouped(counts['points'])} points{merged}"

@@ -12,8 +12,10 @@ from lidar_deflect.cli.options import (
     ConfigFile,
     From,
     Json,
+    Lidars,
     Overwrite,
     Quiet,
+    Sections,
     Sensors,
     Set,
     Threads,
@@ -24,7 +26,7 @@ from lidar_deflect.cli.options import (
     span,
 )
 from lidar_deflect.cli.talk import Talk
-from lidar_deflect.cli.units import overrides
+from lidar_deflect.cli.units import narrowed, overrides
 
 if TYPE_CHECKING:
     from lidar_deflect.result import Result
@@ -49,6 +51,8 @@ def measure(
     set_: Set = None,
     sensor: Sensors = None,
     beams: Beams = None,
+    lidar: Lidars = None,
+    section: Sections = None,
     start: From = None,
     stop: To = None,
     overwrite: Overwrite = False,
@@ -69,6 +73,7 @@ def measure(
 
     begun = perf_counter()
     test = Test.load(config, changes)
+    test = Test(narrowed(test.config, lidar, section), test.path)
     poses = Calibration.load(calibration) if calibration else None
     start_s, stop_s = span(start, stop, captures)
     with talk.progress("measuring") as progress:

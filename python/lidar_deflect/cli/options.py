@@ -63,6 +63,14 @@ Beams = Annotated[
         help="A unit's own angle, fire-time, channel or metadata file; repeatable.",
     ),
 ]
+Lidars = Annotated[
+    list[str] | None,
+    typer.Option("--lidar", metavar="LIDAR", help="Only this lidar, by id or source; repeatable."),
+]
+Sections = Annotated[
+    list[str] | None,
+    typer.Option("--section", metavar="NAME", help="Only this section; repeatable."),
+]
 
 
 def sensor_models(texts: Sequence[str] | None) -> dict[str, str]:

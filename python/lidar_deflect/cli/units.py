@@ -1,4 +1,4 @@
-"""What is known of single units: ``--sensor`` and ``--beams`` as changes to a configuration."""
+"""What options say of single lidars and sections, as changes to a configuration."""
 
 from __future__ import annotations
 
@@ -59,3 +59,24 @@ def _is(lidar: Lidar, source: str) -> bool:
         return lidar.source is not None and split_source(source)[0] == split_source(lidar.source)[0]
     except ValueError:
         return False
+
+
+def narrowed(
+    config: Config, lidars: Sequence[str] | None, sections: Sequence[str] | None
+) -> Config:
+    """Keep only the named lidars and sections, and what belongs to them."""
+    kept = {config.lidars[_index(config, source)].id for source in lidars or ()}
+    kept = kept or {lidar.id for lidar in config.lidars}
+    names = set(sections or [section.name for section in config.sections])
+    unknown = names - {section.name for section in config.sections}
+    if unknown:
+        known = ", ".join(section.name for section in config.sections)
+        raise typer.BadParameter(f"--section {min(unknown)}: expected one of {known}")
+    return config.model_copy(
+        update={
+            "lidars": tuple(lidar for lidar in config.lidars if lidar.id in kept),
+            "distance": tuple(each for each in config.distance if kept.issuperset(each.between)),
+            "sections": tuple(each for each in config.sections if each.name in names),
+            "wires": tuple(wire for wire in config.wires if wire.section in names),
+        }
+    )

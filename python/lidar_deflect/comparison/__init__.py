@@ -6,12 +6,13 @@
 
 from lidar_deflect.comparison.compare import ComparisonWarning, compare, save
 from lidar_deflect.comparison.error import error_percent
-from lidar_deflect.comparison.methods import by_method, largest_step, wire_names
+from lidar_deflect.comparison.methods import LIDAR, by_method, largest_step, wire_names
 from lidar_deflect.comparison.reference import KINDS, Kind, Reference, recognise
 from lidar_deflect.comparison.text import aligned, table1, table2
 
 __all__ = [
     "KINDS",
+    "LIDAR",
     "ComparisonWarning",
     "Kind",
     "Reference",

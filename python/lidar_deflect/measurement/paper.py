@@ -87,7 +87,7 @@ def sections_over_time(
     status = np.repeat(status[:, None], count, axis=1)
     reason = np.repeat(reason[:, None], count, axis=1)
     position[status == MISSING] = np.nan
-    extrapolate(status, reason, position[:, :, 2], contours.seen_z_m[:, 1])
+    extrapolate(status, reason, position[:, :, 2], contours.seen_z_m)
     if inputs.config.paper.overhead == "interpolate":
         interpolate(contours.time_ns, position, status, reason)
     return position, status, reason

@@ -90,7 +90,10 @@ def reference_of(inputs: Inputs, contours: ContourRun, plane: str) -> Reference:
     unloaded = _inside(contours.time_ns, inputs.unloaded_ns)
     z_m = _unloaded_z_m(inputs, s_m)
     to_tip = contours.arc_to_tip(plane, z_m)
-    good = unloaded & ~np.isnan(to_tip).any(axis=1)
+    used = contours.uses.used
+    # Where a lidar of the hold is missing, the curves reach its part of the blade blindly.
+    complete = (used[:, np.median(used[unloaded], axis=0) > 0] > 0).all(axis=1)
+    good = unloaded & complete & ~np.isnan(to_tip).any(axis=1)
     if good.sum() < MIN_FRAMES:
         raise _no_tip(contours, plane, unloaded)
     tips = contours.tip_z_m(plane)[good]
@@ -100,7 +103,7 @@ def reference_of(inputs: Inputs, contours: ContourRun, plane: str) -> Reference:
         to_tip_m=np.median(to_tip[good], axis=0),
         tip_z_m=float(np.median(tips)),
         u_tip_z_m=float(np.std(tips)),
-        blade_points=np.median(contours.uses.used[unloaded], axis=0),
+        blade_points=np.median(used[unloaded], axis=0),
         plane=plane,
         frames=int(good.sum()),
     )

@@ -25,7 +25,7 @@ FEW_POINTS = 0.5
 """Fewer points than this share of the reference's: `degraded`."""
 
 BEYOND_M = 1.0
-"""A section farther than this beyond the last scan line on the blade is `extrapolated`."""
+"""A section farther than this from the scan lines on the blade is `extrapolated`."""
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,9 @@ def grade_frames(
 
 
 def extrapolate(
-    status: NDArray[np.uint8], reason: NDArray[np.object_], z_m: Floats, last_seen_z_m: Floats
+    status: NDArray[np.uint8], reason: NDArray[np.object_], z_m: Floats, seen_z_m: Floats
 ) -> None:
-    """Mark sections beyond the last scan line, in place.
+    """Mark sections before the first or beyond the last scan line, in place.
 
     Parameters
     ----------
@@ -93,11 +93,14 @@ def extrapolate(
         Shape (t, s).
     z_m
         Sections along the span, shape (t, s).
-    last_seen_z_m
-        Last scan line on the blade, shape (t,).
+    seen_z_m
+        First and last scan line on the blade, shape (t, 2).
     """
-    beyond = (z_m > last_seen_z_m[:, None] + BEYOND_M) & (status != MISSING)
-    status[beyond] = EXTRAPOLATED
+    measured = status != MISSING
+    before = measured & (z_m < seen_z_m[:, :1] - BEYOND_M)
+    beyond = measured & (z_m > seen_z_m[:, 1:] + BEYOND_M)
+    status[before | beyond] = EXTRAPOLATED
+    reason[before] = "before_first_line"
     reason[beyond] = "beyond_last_line"
 
 

@@ -29,22 +29,27 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
                 hovertemplate="%{y:.2f} %<extra>%{fullData.name}</extra>",
             )
         )
-    figure.update_xaxes(title_text="section", type="category")
+    order = [
+        style.text(section) for section in bars.sort("s_m")["section"].unique(maintain_order=True)
+    ]
+    figure.update_xaxes(title_text="section", type="category", showgrid=False)
+    figure.update_xaxes(categoryorder="array", categoryarray=order)
     figure.update_yaxes(title_text="error (%)")
     figure.update_layout(barmode="group", height=440)
     return figure
 
 
 def _bars(frame: pl.DataFrame, step: str | None) -> pl.DataFrame:
-    """Columns ``section``, ``name``, ``error_percent``: methods, else lidar against each source."""
+    """Errors by section and name: of each method, else of the lidars against each source."""
     methods = held_against.by_method(frame, step=step)
     if methods.height:
         name = pl.col("method") + " against " + pl.col("against")
-        found = methods.with_columns(name=name)
+        lidars_last = pl.col("method") == held_against.LIDAR
+        found = methods.with_columns(name=name).sort(lidars_last, maintain_order=True)
     else:
         name = "lidar against " + pl.col("source") + ", " + pl.col("quantity")
         found = frame.filter(pl.col("step") == (step or "")).sort("s_m").with_columns(name=name)
-    return found.select("section", "name", "error_percent").drop_nulls()
+    return found.select("section", "s_m", "name", "error_percent").drop_nulls()
 
 
 def health(result: HasTables) -> go.Figure:

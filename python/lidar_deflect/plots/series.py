@@ -33,7 +33,8 @@ def time_series(
     _shade_holds(figure, result.steps)
     _shade_missing(figure, frame)
     figure.update_xaxes(title_text="time (s)", row=3, col=1)
-    figure.update_layout(height=620, meta={"section": name, "s_m": s_m})
+    figure.update_layout(height=620, margin_t=64, meta={"section": name, "s_m": s_m})
+    figure.update_layout(legend_y=1.04)  # above the labels of the holds
     return figure
 
 
@@ -130,7 +131,7 @@ def _shade_holds(figure: go.Figure, steps: pl.DataFrame) -> None:
             y=1.0,
             xref="x",
             yref="y domain",
-            yanchor="top",
+            yanchor="bottom",
             text=style.text(label),
             showarrow=False,
             font={"size": 11, "color": style.GREY},

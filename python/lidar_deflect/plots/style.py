@@ -14,6 +14,14 @@ FAINT = "rgba(128,128,128,0.14)"
 GRID = "rgba(128,128,128,0.25)"
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Noto Sans', sans-serif"
 
+# Without the button that sends the data to a host: a test's numbers stay where they are.
+MODEBAR = {
+    "bgcolor": "rgba(0,0,0,0)",
+    "color": "rgba(128,128,128,0.6)",
+    "activecolor": GREY,
+    "remove": ["sendChartToCloud", "lasso", "select"],
+}
+
 STATUS_MARKS = {
     "degraded": ("#E69F00", "triangle-up"),
     "interpolated": ("#CC79A7", "circle-open"),
@@ -59,6 +67,7 @@ def finish(figure: go.Figure) -> go.Figure:
         colorway=COLOURS,
         margin={"l": 70, "r": 20, "t": 40, "b": 55},
         legend={"orientation": "h", "y": 1.0, "yanchor": "bottom", "x": 0.0},
+        modebar=MODEBAR,
         hovermode="closest",
     )
     axis = {"gridcolor": GRID, "zerolinecolor": GREY, "zerolinewidth": 1, "ticks": "outside"}

@@ -1,7 +1,8 @@
 """One HTML file that works offline, from a result folder and nothing else.
 
-`words` holds every sentence, `content` gathers the facts, `figures` draws; template.html,
-style.css and figures.js beside them are put into the file, so that it asks no host for anything.
+`words` holds every sentence, `content` and `made_of` gather the facts, `figures` draws;
+template.html, style.css and figures.js beside them are put into the file, so that it asks no host
+for anything.
 """
 
 from importlib.resources import files
@@ -12,7 +13,7 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from lidar_deflect.files import write_text
-from lidar_deflect.report import content, words
+from lidar_deflect.report import content, made_of, words
 from lidar_deflect.report.figures import Figures
 from lidar_deflect.results import Folder
 
@@ -64,15 +65,15 @@ def render(folder: Folder) -> str:
         warnings=content.warnings(folder),
         key_table=content.key_table(folder) if folder.steps.height else None,
         compared=content.comparison_tables(folder),
-        statuses=content.statuses(folder),
-        lidars=content.lidars(folder),
-        drops=content.drops(folder),
-        inputs=content.inputs(folder),
-        streams=content.streams(folder),
-        facts=content.facts(folder),
-        evidence=content.evidence(folder),
-        method=content.method(folder),
-        configuration=content.configuration(folder),
+        statuses=made_of.statuses(folder),
+        lidars=made_of.lidars(folder),
+        drops=made_of.drops(folder),
+        inputs=made_of.inputs(folder),
+        streams=made_of.streams(folder),
+        facts=made_of.facts(folder),
+        evidence=made_of.evidence(folder),
+        method=made_of.method(folder),
+        configuration=made_of.configuration(folder),
         comparison_figure=figures.comparison(),
         curves=figures.curves(),
         shapes=figures.shapes(),

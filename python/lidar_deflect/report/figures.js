@@ -1,6 +1,7 @@
 "use strict";
 (() => {
-  const PRINT_WIDTH = 680; // pixels on A4 between the margins of style.css
+  // On A4 between the margins of style.css, so that two figures fit on a page.
+  const PRINT = { width: 680, height: 385 };
   const dark = window.matchMedia("(prefers-color-scheme: dark)");
   const plots = [...document.querySelectorAll(".plot")];
   const options = { responsive: true, displaylogo: false, plotlyServerURL: "", toImageButtonOptions: { scale: 2 } };
@@ -14,7 +15,15 @@
   }
   dark.addEventListener("change", () => plots.forEach((plot) => Plotly.relayout(plot, ink(dark.matches))));
   window.addEventListener("beforeprint", () =>
-    plots.forEach((plot) => Plotly.relayout(plot, { ...ink(false), width: PRINT_WIDTH, autosize: false })));
+    plots.forEach((plot) => {
+      const height = Math.min(PRINT.height, Number(plot.dataset.height));
+      plot.style.minHeight = `${height}px`;
+      Plotly.relayout(plot, { ...ink(false), width: PRINT.width, height, autosize: false });
+    }));
   window.addEventListener("afterprint", () =>
-    plots.forEach((plot) => Plotly.relayout(plot, { ...ink(dark.matches), width: null, autosize: true })));
+    plots.forEach((plot) => {
+      const height = Number(plot.dataset.height);
+      plot.style.minHeight = `${height}px`;
+      Plotly.relayout(plot, { ...ink(dark.matches), width: null, height, autosize: true });
+    }));
 })();

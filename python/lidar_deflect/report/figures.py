@@ -42,7 +42,7 @@ class Figures:
             self._numbered(
                 self._plots.time_series(name),
                 words.CAPTIONS["time_series"].format(section=name, s_m=s_m)
-                + (" " + words.LIKE_THE_PAPER.format(figures="19 and 21") if not k else ""),
+                + (" " + words.LIKE_THE_PAPER.format(figures="figures 19 and 21") if not k else ""),
             )
             for k, (name, s_m) in enumerate(reversed(sections(self._folder.deflection)))
         ]
@@ -51,7 +51,9 @@ class Figures:
         """Errors by method; None where nothing was compared."""
         if self._folder.comparison.is_empty():
             return None
-        caption = f"{words.CAPTIONS['comparison']} {words.LIKE_THE_PAPER.format(figures='20')}"
+        caption = (
+            f"{words.CAPTIONS['comparison']} {words.LIKE_THE_PAPER.format(figures='figure 20')}"
+        )
         return self._numbered(self._plots.comparison(), caption)
 
     def shapes(self) -> list[Figure]:

@@ -45,7 +45,7 @@ CAPTIONS = {
     "plan": "The test from above.",
     "health": "Lost packets and points per lidar and second.",
 }
-LIKE_THE_PAPER = "As the paper's figures {figures}."
+LIKE_THE_PAPER = "Like the paper's {figures}."
 NO_SCRIPT = "Figures need JavaScript; the tables do not."
 
 STATUS = {

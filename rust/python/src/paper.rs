@@ -36,7 +36,10 @@ impl DistancePass {
     #[new]
     fn new(py: Python<'_>, plan: &FramePlan) -> BorderResult<Self> {
         let ranges = DistanceRanges::new(plan.sensors_m().len());
-        Ok(Self { feed: FrameFeed::open(py, plan)?, ranges })
+        Ok(Self {
+            feed: FrameFeed::open(py, plan)?,
+            ranges,
+        })
     }
 
     /// Works through the next frames; False when there are no more.
@@ -56,7 +59,11 @@ impl DistancePass {
 
     /// Smallest and largest distance of each lidar, (lidars, 2), metres; NaN without any.
     fn ranges_m<'py>(&self, py: Python<'py>) -> BorderResult<Bound<'py, PyArray2<f64>>> {
-        let ranges = self.ranges.ranges_m().iter().map(|range| range.unwrap_or([f64::NAN; 2]));
+        let ranges = self
+            .ranges
+            .ranges_m()
+            .iter()
+            .map(|range| range.unwrap_or([f64::NAN; 2]));
         Ok(arrays::rows(py, ranges.collect())?)
     }
 }
@@ -79,9 +86,15 @@ impl ContourPass {
         sample_every: usize,
         sample_points: usize,
     ) -> BorderResult<Self> {
-        let sampling = Sampling { every: sample_every, points: sample_points };
+        let sampling = Sampling {
+            every: sample_every,
+            points: sample_points,
+        };
         let series = ContourSeries::new(params.core(plan.sensors_m()), sampling);
-        Ok(Self { feed: FrameFeed::open(py, plan)?, series })
+        Ok(Self {
+            feed: FrameFeed::open(py, plan)?,
+            series,
+        })
     }
 
     /// Works through the next frames; False when there are no more.
@@ -101,7 +114,12 @@ impl ContourPass {
 
     /// Middles of the frames, (t,), nanoseconds.
     fn time_ns<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        let times: Vec<i64> = self.series.frames().iter().map(|frame| frame.time.0).collect();
+        let times: Vec<i64> = self
+            .series
+            .frames()
+            .iter()
+            .map(|frame| frame.time.0)
+            .collect();
         times.into_pyarray(py)
     }
 
@@ -136,7 +154,11 @@ impl ContourPass {
     }
 
     /// z of the tip, (t,), metres; NaN where there is none.
-    fn tip_z_m<'py>(&self, py: Python<'py>, plane: &str) -> BorderResult<Bound<'py, PyArray1<f64>>> {
+    fn tip_z_m<'py>(
+        &self,
+        py: Python<'py>,
+        plane: &str,
+    ) -> BorderResult<Bound<'py, PyArray1<f64>>> {
         Ok(self.series.tip_z_m(plane_named(plane)?).into_pyarray(py))
     }
 
@@ -171,7 +193,11 @@ impl ContourPass {
         z_m: PyReadonlyArray1<'py, f64>,
     ) -> BorderResult<Bound<'py, PyArray3<f64>>> {
         let places = arrays::values("z_m", &z_m)?;
-        Ok(arrays::tables(py, self.series.points_at_m(places), places.len())?)
+        Ok(arrays::tables(
+            py,
+            self.series.points_at_m(places),
+            places.len(),
+        )?)
     }
 
     /// Leading minus trailing edge at each z, (t, len(z), 3), metres.
@@ -181,7 +207,11 @@ impl ContourPass {
         z_m: PyReadonlyArray1<'py, f64>,
     ) -> BorderResult<Bound<'py, PyArray3<f64>>> {
         let places = arrays::values("z_m", &z_m)?;
-        Ok(arrays::tables(py, self.series.chords_at_m(places), places.len())?)
+        Ok(arrays::tables(
+            py,
+            self.series.chords_at_m(places),
+            places.len(),
+        )?)
     }
 
     /// Time, lidar, ring and place of the blade points that were kept.

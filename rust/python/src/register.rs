@@ -48,15 +48,17 @@ fn yaw_from_wall<'py>(
 ) -> BorderResult<(f64, f64, usize)> {
     let points = arrays::points("levelled", &levelled)?;
     let normal = arrays::direction("normal", &normal)?;
-    let expected = ExpectedWall { normal, distance_m, yaw_range_rad, min_height_m };
+    let expected = ExpectedWall {
+        normal,
+        distance_m,
+        yaw_range_rad,
+        min_height_m,
+    };
     let found = compute(py, Some(1), || wall::yaw_from_wall(points, &expected))??;
     Ok((found.yaw_rad, found.plane.rms, found.plane.count))
 }
 
-fn matrix<'py>(
-    py: Python<'py>,
-    rotation: &Rotation3<f64>,
-) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn matrix<'py>(py: Python<'py>, rotation: &Rotation3<f64>) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let rows: [[f64; 3]; 3] = rotation.matrix().transpose().into(); // nalgebra stores columns
     arrays::rows(py, rows.to_vec())
 }

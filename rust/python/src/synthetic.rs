@@ -15,6 +15,7 @@ use lidar_deflect_core::synthetic::network::NetworkPlan;
 use lidar_deflect_core::synthetic::reference::{self, Stations};
 use lidar_deflect_core::synthetic::simulation::{self, SaddlePlan};
 use lidar_deflect_core::synthetic::terrain::{Crate, GroundPlan, Wall};
+use lidar_deflect_core::synthetic::truth::SectionTruth;
 use lidar_deflect_core::synthetic::{ScenePlan, Simulation};
 use lidar_deflect_core::time::Timestamp;
 use nalgebra::Vector3;
@@ -49,6 +50,7 @@ struct PySimulation {
     writer: Option<PcapWriter<BufWriter<File>>>,
 }
 
+#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 #[pymethods]
 impl PySimulation {
     /// Builds and bends the blade of a scene given as nested dictionaries in SI units.
@@ -103,7 +105,7 @@ impl PySimulation {
         self.simulation.packets()
     }
 
-    /// world_from_sensor of each lidar, 4 x 4 row by row.
+    /// `world_from_sensor` of each lidar, 4 x 4 row by row.
     fn poses(&self) -> Vec<[[f64; 4]; 4]> {
         let matrix = |lidar: &lidar::Lidar| lidar.world_from_sensor.to_matrix().transpose().into();
         self.simulation.lidars.iter().map(matrix).collect()
@@ -121,11 +123,7 @@ impl PySimulation {
     ) -> BorderResult<Bound<'py, PyArray3<f64>>> {
         let times = arrays::column("times_s", &times_s, times_s.len())?;
         let rows = compute(py, threads, || self.simulation.truth(&sections_m, times))?;
-        let flat: Vec<f64> = rows
-            .iter()
-            .flatten()
-            .flat_map(|truth| truth.row())
-            .collect();
+        let flat: Vec<f64> = rows.iter().flatten().flat_map(SectionTruth::row).collect();
         Ok(flat
             .into_pyarray(py)
             .reshape([times.len(), sections_m.len(), 13])?)
@@ -168,7 +166,7 @@ impl PySimulation {
         Ok(columns)
     }
 
-    /// Contours as drawn: (stations * points, 3) with arc length, x_c and y_c.
+    /// Contours as drawn: (stations * points, 3) with arc length, `x_c` and `y_c`.
     fn contours<'py>(&self, py: Python<'py>) -> BorderResult<Bound<'py, PyArray2<f64>>> {
         let blade = &self.simulation.blade;
         let stations = &blade.nominal.s_m;
@@ -286,6 +284,7 @@ struct LidarIn {
 struct OpticsIn {
     beam_rad: f64,
     noise_m: f64,
+    dropout: f64,
     merge_m: f64,
     range_at_10_percent_m: f64,
     max_range_m: f64,
@@ -430,6 +429,7 @@ impl From<OpticsIn> for Optics {
         Self {
             beam_rad: given.beam_rad,
             noise_m: given.noise_m,
+            dropout: given.dropout,
             merge_m: given.merge_m,
             range_at_10_percent_m: given.range_at_10_percent_m,
             max_range_m: given.max_range_m,

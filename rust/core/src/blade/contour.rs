@@ -28,8 +28,9 @@ pub fn line_extremes(
     for (point, ring) in points_m.iter().zip(rings) {
         let point = point.map(f64::from);
         let along = leading_edge.dot(&Vector3::from(point));
-        let [leading, trailing] =
-            lines.entry(*ring).or_insert([(f64::NEG_INFINITY, point), (f64::INFINITY, point)]);
+        let [leading, trailing] = lines
+            .entry(*ring)
+            .or_insert([(f64::NEG_INFINITY, point), (f64::INFINITY, point)]);
         if along > leading.0 {
             *leading = (along, point);
         }
@@ -51,7 +52,12 @@ mod tests {
 
     #[test]
     fn each_ring_gives_its_two_ends() {
-        let points = [[0.0, 0.0, 1.0], [-2.0, 0.1, 1.0], [3.0, 0.2, 1.0], [1.0, 5.0, 2.0f32]];
+        let points = [
+            [0.0, 0.0, 1.0],
+            [-2.0, 0.1, 1.0],
+            [3.0, 0.2, 1.0],
+            [1.0, 5.0, 2.0f32],
+        ];
         let lines = line_extremes(&points, &[7, 7, 7, 2], &-Vector3::x_axis());
         assert_eq!(lines.len(), 2);
         assert_eq!(lines[0].ring, 2);

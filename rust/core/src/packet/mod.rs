@@ -211,6 +211,20 @@ pub struct LeftOut {
 }
 
 impl Head {
+    /// The same with the time over a gap from the rotation rate over many packets, which is known
+    /// better than the rate within one.
+    pub fn paced(mut self, mean_rate_rad_per_ns: f64) -> Self {
+        if let Some(gap) = self.left_out
+            && self.rate_rad_per_ns > 0.0
+            && mean_rate_rad_per_ns > 0.0
+        {
+            let longer = 1.0 / mean_rate_rad_per_ns - 1.0 / self.rate_rad_per_ns;
+            let longer_ns = (gap.width_rad * longer) as i64;
+            self.duration_ns = self.duration_ns.saturating_add(longer_ns);
+        }
+        self
+    }
+
     /// Angle that was seen between two angles turned since the first shot.
     pub fn seen_rad(&self, from_rad: f64, to_rad: f64) -> f64 {
         let left_out = self.left_out.map_or(0.0, |gap| {
@@ -279,6 +293,8 @@ pub struct Place {
     pub time: Timestamp,
     /// Number among the data packets of its stream, 0-based.
     pub packet: u32,
+    /// Rotation rate over the packets before; 0 where it is not known.
+    pub mean_rate_rad_per_ns: f64,
 }
 
 /// Returns of one packet, in the order of the shots. The buffer is meant to be used again and again.

@@ -6,8 +6,8 @@ use super::curves::{ContourCurve, Degrees, fit_contour};
 use super::frames::{Frame, Share};
 use super::tip::{NoTip, Plane, Tip, TipLimits, intersect};
 use crate::blade::contour::{LineExtremes, line_extremes};
-use crate::cluster::dbscan::{DbscanParams, dbscan};
 use crate::cluster::NOISE;
+use crate::cluster::dbscan::{DbscanParams, dbscan};
 use crate::cluster::line::{LineParams, line_clusters};
 use crate::cluster::radius::{Intervals, RadiusModel};
 use crate::fit::Fit;
@@ -147,8 +147,12 @@ impl BladePoints {
 
 /// Steps 6 to 10.
 pub fn frame_contours(frame: &Frame, params: &FrameParams) -> FrameContours {
-    let (uses, blades): (Vec<_>, Vec<_>) =
-        frame.shares.iter().enumerate().map(|(lidar, share)| blade_of(share, lidar, params)).unzip();
+    let (uses, blades): (Vec<_>, Vec<_>) = frame
+        .shares
+        .iter()
+        .enumerate()
+        .map(|(lidar, share)| blade_of(share, lidar, params))
+        .unzip();
     let lines: Vec<Vec<LineExtremes>> = blades
         .iter()
         .map(|blade| line_extremes(&blade.points_m, &blade.rings, &params.leading_edge))
@@ -166,7 +170,13 @@ pub fn frame_contours(frame: &Frame, params: &FrameParams) -> FrameContours {
         Some(Contours { leading, trailing }) => intersect(leading, trailing, plane, &params.tip),
         None => Err(NoTip::NoIntersection),
     });
-    FrameContours { time: frame.time, uses, contours, tips, rejected }
+    FrameContours {
+        time: frame.time,
+        uses,
+        contours,
+        tips,
+        rejected,
+    }
 }
 
 /// Steps 12 and 6 for one lidar: leave an overhead blade out, then drop the noise.
@@ -196,7 +206,9 @@ fn is_overhead(share: &Share, sensor_m: &Point3<f64>, limit_m: Option<f64>) -> b
 fn without_noise(share: &Share, lidar: usize, params: &FrameParams) -> BladePoints {
     // Points of a box are finite and their radii positive, so nothing can refuse them.
     let labels = clustering(share, lidar, params).and_then(|c| dbscan(&share.points_m, &c).ok());
-    let Some(labels) = labels else { return BladePoints::default() };
+    let Some(labels) = labels else {
+        return BladePoints::default();
+    };
     let counts = |index: &usize| labels.as_slice()[*index] != NOISE;
     let kept: Vec<usize> = (0..share.points_m.len()).filter(counts).collect();
     BladePoints {
@@ -215,11 +227,15 @@ fn clustering(share: &Share, lidar: usize, params: &FrameParams) -> Option<Dbsca
             DbscanParams::new(params.model.radius_m(edge_m), params.min_points)
         }
         RadiusRule::Continuous => {
-            let radii = params.model.radii_m(&share.points_m, (*sensor).into()).ok()?;
+            let radii = params
+                .model
+                .radii_m(&share.points_m, (*sensor).into())
+                .ok()?;
             DbscanParams::new(radii, params.min_points)
         }
     };
-    made.ok().map(|made| if params.strict { made.strict() } else { made })
+    made.ok()
+        .map(|made| if params.strict { made.strict() } else { made })
 }
 
 /// Step 8: samples of one contour that agree on a line; the others are listed with their reason.
@@ -230,13 +246,18 @@ fn agreeing_samples(
     rejected: &mut Vec<Rejected>,
 ) -> Vec<[f64; 3]> {
     let samples: Vec<[f64; 3]> = lines.iter().flatten().map(edge).collect();
-    let Some(radius_m) = params.contour_radius_m.or_else(|| line_radius_m(lines, edge)) else {
+    let Some(radius_m) = params
+        .contour_radius_m
+        .or_else(|| line_radius_m(lines, edge))
+    else {
         return Vec::new();
     };
     let Ok(clustering) = DbscanParams::new(radius_m, params.contour_min_points) else {
         return Vec::new();
     };
-    let Ok(labels) = dbscan(&samples, &clustering) else { return Vec::new() };
+    let Ok(labels) = dbscan(&samples, &clustering) else {
+        return Vec::new();
+    };
     let Ok(judged) = line_clusters(&samples, labels.as_slice(), &params.line) else {
         return Vec::new(); // all samples are noise
     };
@@ -246,22 +267,34 @@ fn agreeing_samples(
         count: cluster.count as u32,
         reason: "off_the_line",
     }));
-    samples.into_iter().zip(judged.keep).filter(|(_, keep)| *keep).map(|(p, _)| p).collect()
+    samples
+        .into_iter()
+        .zip(judged.keep)
+        .filter(|(_, keep)| *keep)
+        .map(|(p, _)| p)
+        .collect()
 }
 
 fn noise<'a>(samples: &'a [[f64; 3]], labels: &'a [i32]) -> impl Iterator<Item = Rejected> + 'a {
-    let alone = samples.iter().zip(labels).filter(|(_, label)| **label == NOISE);
-    alone.map(|(sample, _)| Rejected { centre_m: *sample, count: 1, reason: "alone" })
+    let alone = samples
+        .iter()
+        .zip(labels)
+        .filter(|(_, label)| **label == NOISE);
+    alone.map(|(sample, _)| Rejected {
+        centre_m: *sample,
+        count: 1,
+        reason: "alone",
+    })
 }
 
 /// 1.5 times the largest distance along the span between lines of neighbouring beams.
-fn line_radius_m(
-    lines: &[Vec<LineExtremes>],
-    edge: fn(&LineExtremes) -> [f64; 3],
-) -> Option<f64> {
+fn line_radius_m(lines: &[Vec<LineExtremes>], edge: fn(&LineExtremes) -> [f64; 3]) -> Option<f64> {
     const FACTOR: f64 = 1.5;
     let neighbours = lines.iter().flat_map(|of_lidar| of_lidar.windows(2));
     let adjacent = neighbours.filter(|pair| pair[0].ring.abs_diff(pair[1].ring) == 1);
     let spacing = adjacent.map(|pair| (edge(&pair[1])[2] - edge(&pair[0])[2]).abs());
-    spacing.reduce(f64::max).map(|largest| FACTOR * largest).filter(|radius| *radius > 0.0)
+    spacing
+        .reduce(f64::max)
+        .map(|largest| FACTOR * largest)
+        .filter(|radius| *radius > 0.0)
 }

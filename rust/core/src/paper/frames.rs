@@ -36,7 +36,11 @@ impl Share {
     pub fn distance_m(&self, sensor_m: &Point3<f64>) -> Option<f64> {
         let count = self.points_m.len() as f64;
         let sum = self.points_m.iter().fold([0.0; 3], |sum, p| {
-            [sum[0] + f64::from(p[0]), sum[1] + f64::from(p[1]), sum[2] + f64::from(p[2])]
+            [
+                sum[0] + f64::from(p[0]),
+                sum[1] + f64::from(p[1]),
+                sum[2] + f64::from(p[2]),
+            ]
         });
         (count > 0.0).then(|| (Point3::from(sum.map(|s| s / count)) - sensor_m).norm())
     }
@@ -84,7 +88,14 @@ impl FrameAssembler {
             });
         }
         let waiting = vec![VecDeque::new(); poses.len()];
-        Ok(Self { poses, pass, period_ns, next: first, waiting, ended: false })
+        Ok(Self {
+            poses,
+            pass,
+            period_ns,
+            next: first,
+            waiting,
+            ended: false,
+        })
     }
 
     /// Takes the next sweep of its lidar.
@@ -104,7 +115,12 @@ impl FrameAssembler {
         let complete = |queue: &VecDeque<(Timestamp, Share)>| {
             queue.back().is_some_and(|(middle, _)| *middle >= self.next)
         };
-        let newest = self.waiting.iter().filter_map(|queue| queue.back()).map(|(t, _)| *t).max();
+        let newest = self
+            .waiting
+            .iter()
+            .filter_map(|queue| queue.back())
+            .map(|(t, _)| *t)
+            .max();
         let overdue = newest.is_some_and(|newest| newest - self.next > PATIENCE_NS);
         let ready = if self.ended || overdue {
             self.waiting.iter().any(complete)
@@ -115,7 +131,11 @@ impl FrameAssembler {
             return None;
         }
         let (time, reach) = (self.next, self.period_ns);
-        let shares = self.waiting.iter_mut().map(|queue| nearest(queue, time, reach)).collect();
+        let shares = self
+            .waiting
+            .iter_mut()
+            .map(|queue| nearest(queue, time, reach))
+            .collect();
         self.next = time + self.period_ns;
         Some(Frame { time, shares })
     }
@@ -128,11 +148,18 @@ fn nearest(queue: &mut VecDeque<(Timestamp, Share)>, time: Timestamp, reach_ns: 
         queue.pop_front();
     }
     // A sweep may serve two frames where the sensor turns more slowly than frames come.
-    queue.front().filter(|entry| off(entry) <= reach_ns).map(|e| e.1.clone()).unwrap_or_default()
+    queue
+        .front()
+        .filter(|entry| off(entry) <= reach_ns)
+        .map(|e| e.1.clone())
+        .unwrap_or_default()
 }
 
 fn share_of(sweep: &Sweep, world_from_sensor: &WorldFromSensor, pass: &PassThrough) -> Share {
-    let mut share = Share { present: true, ..Share::default() };
+    let mut share = Share {
+        present: true,
+        ..Share::default()
+    };
     let mut seen: Option<Gap> = None; // first and last shot that passed
     for (index, xyz) in sweep.cloud.xyz_m.iter().enumerate() {
         let point = world_from_sensor.transform(&Point3::from(xyz.map(f64::from)));
@@ -141,13 +168,16 @@ fn share_of(sweep: &Sweep, world_from_sensor: &WorldFromSensor, pass: &PassThrou
             share.points_m.push(point);
             share.rings.push(sweep.cloud.ring[index]);
             let time = Timestamp(sweep.cloud.time_ns[index]);
-            seen = Some(Gap { from: seen.map_or(time, |s| s.from.min(time)), to: time });
+            seen = Some(Gap {
+                from: seen.map_or(time, |s| s.from.min(time)),
+                to: time,
+            });
         }
     }
     // Where nothing is left of the blade, any gap may have held it.
-    let overlaps = |gap: &Gap| seen.is_none_or(|s| {
-        gap.from <= s.to + NEAR_BLADE_NS && s.from <= gap.to + NEAR_BLADE_NS
-    });
+    let overlaps = |gap: &Gap| {
+        seen.is_none_or(|s| gap.from <= s.to + NEAR_BLADE_NS && s.from <= gap.to + NEAR_BLADE_NS)
+    };
     share.lost_on_blade = sweep.gaps.iter().any(overlaps);
     share
 }
@@ -211,9 +241,19 @@ mod tests {
         assert_eq!(first.shares[0].rings, [1, 2, 3, 4]);
         assert_eq!(frames.pop().unwrap().time, Timestamp(PERIOD));
         assert_eq!(frames.pop().unwrap().time, Timestamp(2 * PERIOD));
-        assert!(frames.pop().is_none(), "a later sweep of lidar 1 may be nearer");
+        assert!(
+            frames.pop().is_none(),
+            "a later sweep of lidar 1 may be nearer"
+        );
         frames.finish();
-        assert!(frames.pop().unwrap().shares.iter().all(|share| share.present));
+        assert!(
+            frames
+                .pop()
+                .unwrap()
+                .shares
+                .iter()
+                .all(|share| share.present)
+        );
         assert!(frames.pop().is_none());
     }
 
@@ -224,14 +264,18 @@ mod tests {
         for k in 0..30 {
             frames.push(&sweep(0, k * PERIOD, vec![]));
         }
-        let present: Vec<bool> =
-            std::iter::from_fn(|| frames.pop()).map(|frame| frame.shares[1].present).collect();
+        let present: Vec<bool> = std::iter::from_fn(|| frames.pop())
+            .map(|frame| frame.shares[1].present)
+            .collect();
         assert!(present.len() > 15 && present[0] && !present[3]);
     }
 
     #[test]
     fn only_gaps_where_the_blade_was_seen_count() {
-        let gap = |from, to| Gap { from: Timestamp(from), to: Timestamp(to) };
+        let gap = |from, to| Gap {
+            from: Timestamp(from),
+            to: Timestamp(to),
+        };
         let near = sweep(0, 0, vec![gap(500_000, 1_800_000)]);
         let far = sweep(0, 0, vec![gap(30_000_000, 31_300_000)]);
         for (sweep, expected) in [(near, true), (far, false)] {
@@ -243,7 +287,10 @@ mod tests {
 
     #[test]
     fn the_distance_is_from_the_mean_of_the_points() {
-        let share = Share { points_m: vec![[2.0, 0.0, 80.0], [4.0, 0.0, 80.0]], ..Share::default() };
+        let share = Share {
+            points_m: vec![[2.0, 0.0, 80.0], [4.0, 0.0, 80.0]],
+            ..Share::default()
+        };
         assert_eq!(share.distance_m(&Point3::new(0.0, 4.0, 80.0)), Some(5.0));
         assert_eq!(Share::default().distance_m(&Point3::origin()), None);
     }

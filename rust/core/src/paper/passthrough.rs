@@ -22,7 +22,10 @@ impl PassThrough {
                 found: format!("{min_m:?} to {max_m:?}"),
             });
         }
-        Ok(Self { min_m: min_m.map(|v| v as f32), max_m: max_m.map(|v| v as f32) })
+        Ok(Self {
+            min_m: min_m.map(|v| v as f32),
+            max_m: max_m.map(|v| v as f32),
+        })
     }
 
     /// Whether a point lies in the box.

@@ -15,8 +15,14 @@ pub struct MidLine(SpaceCurve);
 impl MidLine {
     /// The line between two contours; `None` where their coefficients overflow.
     pub fn new(leading: &ContourCurve, trailing: &ContourCurve) -> Option<Self> {
-        let across = [mean(&leading.x, &trailing.x)?, mean(&leading.y, &trailing.y)?];
-        Some(Self(SpaceCurve { axis: SpanAxis::Z, across }))
+        let across = [
+            mean(&leading.x, &trailing.x)?,
+            mean(&leading.y, &trailing.y)?,
+        ];
+        Some(Self(SpaceCurve {
+            axis: SpanAxis::Z,
+            across,
+        }))
     }
 
     /// Its point at `z_m`, metres, world frame.
@@ -51,8 +57,10 @@ mod tests {
     /// Both edges of a chord of 2 m on a straight line that leans by 3 in 4.
     fn contours() -> [ContourCurve; 2] {
         [1.0, -1.0].map(|side| {
-            let samples: Vec<[f64; 3]> =
-                (0..20).map(|i| f64::from(i)).map(|z| [0.75 * z + side, 2.0, z]).collect();
+            let samples: Vec<[f64; 3]> = (0..20)
+                .map(|i| f64::from(i))
+                .map(|z| [0.75 * z + side, 2.0, z])
+                .collect();
             fit_contour(&samples, Degrees::new(1, 2).unwrap()).unwrap()
         })
     }

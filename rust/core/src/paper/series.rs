@@ -23,7 +23,9 @@ impl DistanceRanges {
     pub fn extend(&mut self, frames: &[Frame], sensors_m: &[Point3<f64>]) {
         for frame in frames {
             for ((range, share), sensor) in self.0.iter_mut().zip(&frame.shares).zip(sensors_m) {
-                let Some(d) = share.distance_m(sensor) else { continue };
+                let Some(d) = share.distance_m(sensor) else {
+                    continue;
+                };
                 let [low, high] = range.unwrap_or([d, d]);
                 *range = Some([low.min(d), high.max(d)]);
             }
@@ -63,7 +65,8 @@ impl PointColumns {
         let count = blade.rings.len();
         self.time_ns.extend(std::iter::repeat_n(time.0, count));
         self.lidar.extend(std::iter::repeat_n(lidar as u32, count));
-        self.ring.extend(blade.rings.iter().map(|ring| u32::from(*ring)));
+        self.ring
+            .extend(blade.rings.iter().map(|ring| u32::from(*ring)));
         self.xyz_m.extend_from_slice(&blade.points_m);
     }
 }
@@ -93,7 +96,12 @@ pub struct ContourSeries {
 impl ContourSeries {
     /// Nothing yet.
     pub fn new(params: FrameParams, sampling: Sampling) -> Self {
-        Self { params, sampling, frames: Vec::new(), points: PointColumns::default() }
+        Self {
+            params,
+            sampling,
+            frames: Vec::new(),
+            points: PointColumns::default(),
+        }
     }
 
     /// Takes the next frames, in parallel; the order and the bits of the results do not depend on it.
@@ -104,7 +112,11 @@ impl ContourSeries {
             .enumerate()
             .map(|(index, frame)| {
                 let wanted = (done + index).is_multiple_of(sampling.every.max(1));
-                let blades = if wanted { sample(frame, params, sampling) } else { Vec::new() };
+                let blades = if wanted {
+                    sample(frame, params, sampling)
+                } else {
+                    Vec::new()
+                };
                 (frame_contours(frame, params), blades)
             })
             .collect();
@@ -165,7 +177,10 @@ impl ContourSeries {
 
     /// z of the tip of each frame, metres; NaN where there is none.
     pub fn tip_z_m(&self, plane: Plane) -> Vec<f64> {
-        self.frames.iter().map(|frame| frame.tip(plane).map_or(f64::NAN, |tip| tip.z_m)).collect()
+        self.frames
+            .iter()
+            .map(|frame| frame.tip(plane).map_or(f64::NAN, |tip| tip.z_m))
+            .collect()
     }
 
     /// Arc length (15) from each z to the tip, metres; frame by frame, NaN without a tip.
@@ -186,17 +201,24 @@ impl ContourSeries {
 
     /// Points of the mid-chord line at each z, metres; frame by frame, NaN without contours.
     pub fn points_at_m(&self, z_m: &[f64]) -> Vec<[f64; 3]> {
-        self.at_each(z_m, [f64::NAN; 3], |frame, z| Some(mid_line(frame)?.point_m(z)))
+        self.at_each(z_m, [f64::NAN; 3], |frame, z| {
+            Some(mid_line(frame)?.point_m(z))
+        })
     }
 
     /// Leading minus trailing edge at each z, metres; frame by frame, NaN without contours.
     pub fn chords_at_m(&self, z_m: &[f64]) -> Vec<[f64; 3]> {
-        self.at_each(z_m, [f64::NAN; 3], |frame, z| Some(frame.contours.as_ref()?.chord_m(z)))
+        self.at_each(z_m, [f64::NAN; 3], |frame, z| {
+            Some(frame.contours.as_ref()?.chord_m(z))
+        })
     }
 
     /// What became of each lidar's share, frame by frame.
     pub fn uses<T>(&self, of: impl Fn(&ShareUse) -> T) -> Vec<T> {
-        self.frames.iter().flat_map(|frame| frame.uses.iter().map(&of)).collect()
+        self.frames
+            .iter()
+            .flat_map(|frame| frame.uses.iter().map(&of))
+            .collect()
     }
 
     fn at_each<T: Clone + Send + Sync>(
@@ -206,7 +228,10 @@ impl ContourSeries {
         of: impl Fn(&FrameContours, f64) -> Option<T> + Sync,
     ) -> Vec<T> {
         let row = |frame: &FrameContours| -> Vec<T> {
-            places.iter().map(|p| of(frame, *p).unwrap_or_else(|| missing.clone())).collect()
+            places
+                .iter()
+                .map(|p| of(frame, *p).unwrap_or_else(|| missing.clone()))
+                .collect()
         };
         let rows: Vec<Vec<T>> = self.frames.par_iter().map(row).collect();
         rows.concat()
@@ -214,7 +239,10 @@ impl ContourSeries {
 }
 
 fn mid_line(frame: &FrameContours) -> Option<MidLine> {
-    frame.contours.as_ref().and_then(|both| MidLine::new(&both.leading, &both.trailing))
+    frame
+        .contours
+        .as_ref()
+        .and_then(|both| MidLine::new(&both.leading, &both.trailing))
 }
 
 fn sample(frame: &Frame, params: &FrameParams, sampling: Sampling) -> Vec<BladePoints> {

@@ -84,10 +84,15 @@ pub fn intersect(
     let end = leading.seen_z_m[1].max(trailing.seen_z_m[1]);
     let length = end - leading.seen_z_m[0].min(trailing.seen_z_m[0]);
     let gap = |z: f64| a.estimate.value(z) - b.estimate.value(z);
-    let z_m = first_root(gap, end - BEFORE_END * length, end + length).ok_or(NoTip::NoIntersection)?;
+    let z_m =
+        first_root(gap, end - BEFORE_END * length, end + length).ok_or(NoTip::NoIntersection)?;
     let slope = (a.estimate.slope(z_m) - b.estimate.slope(z_m)).abs();
     let u_z_m = (a.variance_at(z_m) + b.variance_at(z_m)).sqrt() / slope;
-    if u_z_m <= limits.max_u_m { Ok(Tip { z_m, u_z_m }) } else { Err(NoTip::IllPosed) }
+    if u_z_m <= limits.max_u_m {
+        Ok(Tip { z_m, u_z_m })
+    } else {
+        Err(NoTip::IllPosed)
+    }
 }
 
 fn on_plane(curve: &ContourCurve, plane: Plane) -> &Fit<Polynomial> {
@@ -105,7 +110,11 @@ fn first_root(f: impl Fn(f64) -> f64, from: f64, to: f64) -> Option<f64> {
     let rising = f(high) > f(low);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        if (f(middle) > 0.0) == rising { high = middle } else { low = middle }
+        if (f(middle) > 0.0) == rising {
+            high = middle
+        } else {
+            low = middle
+        }
     }
     Some(0.5 * (low + high))
 }
@@ -123,7 +132,11 @@ mod tests {
                 .map(|i| {
                     let z = 80.0 + 25.0 * f64::from(i) / 59.0;
                     let noise = ripple * (f64::from(i) * 2.3 + side).sin();
-                    [0.001 * z * z + side * 0.1 * (tip - z) + noise, 0.01 * z + noise, z]
+                    [
+                        0.001 * z * z + side * 0.1 * (tip - z) + noise,
+                        0.01 * z + noise,
+                        z,
+                    ]
                 })
                 .collect();
             fit_contour(&samples, Degrees::new(1, 2).unwrap()).unwrap()

@@ -60,7 +60,10 @@ impl Coded for WallError {
     }
 
     fn hint(&self) -> Option<String> {
-        Some("check the surveyed wall points and the position of this lidar, or leave the wall out".into())
+        Some(
+            "check the surveyed wall points and the position of this lidar, or leave the wall out"
+                .into(),
+        )
     }
 }
 
@@ -78,11 +81,15 @@ pub fn yaw_from_wall(levelled: &[[f32; 3]], wall: &ExpectedWall) -> Result<WallY
         .collect();
     let steps = (wall.yaw_range_rad / STEP_RAD).ceil() as i32;
     // The middle first, so that ties go to the smallest turn.
-    let yaws = (0..=steps).flat_map(|k| [f64::from(k), f64::from(-k)]).map(|k| k * STEP_RAD);
-    let best = yaws.map(|yaw| (voters(&candidates, wall, yaw).count(), yaw)).fold(
-        (0, 0.0),
-        |best, next| if next.0 > best.0 { next } else { best },
-    );
+    let yaws = (0..=steps)
+        .flat_map(|k| [f64::from(k), f64::from(-k)])
+        .map(|k| k * STEP_RAD);
+    let best = yaws
+        .map(|yaw| (voters(&candidates, wall, yaw).count(), yaw))
+        .fold(
+            (0, 0.0),
+            |best, next| if next.0 > best.0 { next } else { best },
+        );
     let refuse = || WallError::NotSeen {
         distance_m: wall.distance_m.abs(),
         range_deg: wall.yaw_range_rad.to_degrees(),
@@ -91,9 +98,14 @@ pub fn yaw_from_wall(levelled: &[[f32; 3]], wall: &ExpectedWall) -> Result<WallY
     if best.0 < MIN_POINTS {
         return Err(refuse());
     }
-    let inliers: Vec<[f64; 3]> = voters(&candidates, wall, best.1).map(|p| (*p).into()).collect();
+    let inliers: Vec<[f64; 3]> = voters(&candidates, wall, best.1)
+        .map(|p| (*p).into())
+        .collect();
     let plane = fit_plane(&inliers, &Vector3::zeros()).map_err(|_| refuse())?;
-    Ok(WallYaw { yaw_rad: yaw_between(&plane.estimate.normal, wall), plane })
+    Ok(WallYaw {
+        yaw_rad: yaw_between(&plane.estimate.normal, wall),
+        plane,
+    })
 }
 
 fn voters<'a>(
@@ -104,12 +116,18 @@ fn voters<'a>(
     // n . (R p) = (R^T n) . p: turn the one normal instead of all points.
     let normal = Rotation3::from_axis_angle(&Vector3::y_axis(), -yaw_rad) * *wall.normal;
     let distance_m = wall.distance_m;
-    points.iter().filter(move |p| (normal.dot(p) - distance_m).abs() < BAND_M)
+    points
+        .iter()
+        .filter(move |p| (normal.dot(p) - distance_m).abs() < BAND_M)
 }
 
 /// Turn about world up from the seen normal (towards the sensor) to the surveyed one.
 fn yaw_between(seen: &Vector3<f64>, wall: &ExpectedWall) -> f64 {
-    let towards_sensor = if wall.distance_m > 0.0 { -*wall.normal } else { *wall.normal };
+    let towards_sensor = if wall.distance_m > 0.0 {
+        -*wall.normal
+    } else {
+        *wall.normal
+    };
     let heading = |v: &Vector3<f64>| v.x.atan2(v.z);
     crate::angle::wrap_half_turn(heading(&towards_sensor) - heading(seen))
 }
@@ -144,7 +162,11 @@ mod tests {
             let mut points = wall_points(yaw);
             points.extend((0..400).map(|i| [5.0 + (i % 20) as f32, (i / 20) as f32, 3.0])); // a box
             let found = yaw_from_wall(&points, &expected()).unwrap();
-            assert!((found.yaw_rad - yaw).abs() < 1e-6, "{yaw}: {}", found.yaw_rad);
+            assert!(
+                (found.yaw_rad - yaw).abs() < 1e-6,
+                "{yaw}: {}",
+                found.yaw_rad
+            );
             assert_eq!(found.plane.count, 1000);
         }
     }

@@ -8,6 +8,9 @@ use crate::loss::view::FieldOfView;
 use crate::packet::{Head, ModelRef};
 use crate::time::Timestamp;
 
+/// Weight of the newest packet in the mean rotation rate.
+const RATE_WEIGHT: f64 = 1.0 / 64.0;
+
 /// What is kept of a packet beside its payload.
 #[derive(Debug, Clone, Copy)]
 pub struct Ticket {
@@ -17,6 +20,7 @@ pub struct Ticket {
     pub head: Head,
     /// Number among the stream's data packets in the order of arrival.
     pub packet: u32,
+    pub mean_rate_rad_per_ns: f64,
 }
 
 /// A packet in its place.
@@ -78,6 +82,7 @@ pub struct Arrivals<T> {
     packets: u32,
     segment: usize,
     last: Option<Last>,
+    mean_rate_rad_per_ns: f64,
 }
 
 /// Where the last passed packet ended.
@@ -108,6 +113,7 @@ impl<T> Arrivals<T> {
             packets: 0,
             segment: 0,
             last: None,
+            mean_rate_rad_per_ns: 0.0,
         }
     }
 
@@ -122,8 +128,9 @@ impl<T> Arrivals<T> {
         let ticket = Ticket {
             arrival,
             device: self.clock.unroll(arrival, head.device_ns),
-            head: *head,
+            head: head.paced(self.follow_rate(head)),
             packet: self.packets,
+            mean_rate_rad_per_ns: self.mean_rate_rad_per_ns,
         };
         let ticket = self.complete(ticket);
         self.packets = self.packets.wrapping_add(1);
@@ -202,6 +209,20 @@ impl<T> Arrivals<T> {
             head.turned_rad = head.rate_rad_per_ns * head.duration_ns as f64;
         }
         ticket
+    }
+
+    /// Mean rotation rate over the last hundred packets or so.
+    fn follow_rate(&mut self, head: &Head) -> f64 {
+        if head.left_out.is_none() && head.rate_rad_per_ns > 0.0 {
+            let change = head.rate_rad_per_ns - self.mean_rate_rad_per_ns;
+            let weight = if self.mean_rate_rad_per_ns > 0.0 {
+                RATE_WEIGHT
+            } else {
+                1.0
+            };
+            self.mean_rate_rad_per_ns += weight * change;
+        }
+        self.mean_rate_rad_per_ns
     }
 
     fn stamp(&mut self, ticket: &Ticket, mark: u64) -> Stamp {

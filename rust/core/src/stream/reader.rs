@@ -242,6 +242,7 @@ impl<S: Sink> Lane<S> {
         let place = Place {
             time,
             packet: ticket.packet,
+            mean_rate_rad_per_ns: ticket.mean_rate_rad_per_ns,
         };
         self.decoder.decode(payload, place, step.decoded);
         self.sink.push(&placed, step.decoded, step.out);

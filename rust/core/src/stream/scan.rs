@@ -22,6 +22,8 @@ const PAUSE_NS: i64 = 10 * NANOS_PER_SECOND;
 const MAX_STREAMS: usize = 4096;
 /// Gaps wait for the field of view to be known, but not more of them than this.
 const MAX_PENDING: usize = 4096;
+/// Foreign datagrams before a stream is decided whose second is remembered.
+const MAX_EARLY: usize = 1024;
 /// Turns after which the field of view is known.
 const VIEW_TURNS: u32 = 5;
 /// More packets than one sensor can send by this factor come from two.
@@ -51,6 +53,8 @@ struct Stream {
     state: State,
     packets: u64,
     foreign: u64,
+    /// When foreign datagrams came before the stream was decided, the first few.
+    early_foreign: Vec<Timestamp>,
     first: Timestamp,
     last: Timestamp,
     payload_len: usize,
@@ -204,6 +208,7 @@ impl Stream {
             state: State::Probing(Probe::new(named)),
             packets: 0,
             foreign: 0,
+            early_foreign: Vec::new(),
             first: datagram.time,
             last: datagram.time,
             payload_len: datagram.payload.len(),
@@ -234,6 +239,9 @@ impl Stream {
                     }
                 } else if !self.take_companion(datagram) {
                     self.foreign += 1;
+                    if self.early_foreign.len() < MAX_EARLY {
+                        self.early_foreign.push(datagram.time);
+                    }
                     if self.closest.is_none() {
                         let near = closest(payload);
                         self.closest = near.map(|(model, why)| (model.id(), why));
@@ -298,6 +306,9 @@ impl Stream {
             }
         }
         self.state = State::Lidar(lidar);
+        for arrival in std::mem::take(&mut self.early_foreign) {
+            self.note_foreign(arrival, shared);
+        }
     }
 
     fn finish(&mut self, shared: &mut Shared) {

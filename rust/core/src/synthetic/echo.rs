@@ -16,6 +16,8 @@ pub struct Optics {
     pub beam_rad: f64,
     /// Standard deviation of a range, metres.
     pub noise_m: f64,
+    /// Share of echoes that is lost whatever they meet.
+    pub dropout: f64,
     /// Echoes that are closer than this melt into one, metres.
     pub merge_m: f64,
     /// Range at which a matt surface of 10 % gives nineteen echoes in twenty, metres.
@@ -177,7 +179,7 @@ impl Optics {
     fn detection(&self, echo: &Glow) -> f64 {
         let strength = echo.energy * self.range_at_10_percent_m.powi(2) / 0.1;
         let upright = (echo.cosine - self.grazing_rad.cos()) / 0.03;
-        (1.0 - (-3.0 * strength).exp()) / (1.0 + (-upright).exp())
+        (1.0 - self.dropout) * (1.0 - (-3.0 * strength).exp()) / (1.0 + (-upright).exp())
     }
 }
 
@@ -190,6 +192,7 @@ mod tests {
         Optics {
             beam_rad: 1e-3,
             noise_m: 0.01,
+            dropout: 0.0,
             merge_m: 0.4,
             range_at_10_percent_m: 60.0,
             max_range_m: 100.0,

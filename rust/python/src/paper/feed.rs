@@ -77,7 +77,10 @@ impl FramePlan {
 impl FramePlan {
     /// Optical centres, metres, world frame.
     pub fn sensors_m(&self) -> Vec<Point3<f64>> {
-        self.poses.iter().map(|pose| pose.translation_m().into()).collect()
+        self.poses
+            .iter()
+            .map(|pose| pose.translation_m().into())
+            .collect()
     }
 }
 
@@ -147,7 +150,13 @@ impl FrameFeed {
     }
 
     fn read_on(&mut self, py: Python<'_>, progress: Option<&Py<PyAny>>) -> BorderResult<()> {
-        let Self { feed, reader, assembler, place, .. } = self;
+        let Self {
+            feed,
+            reader,
+            assembler,
+            place,
+            ..
+        } = self;
         let more = feed.block(py, progress, |datagram| {
             reader.push(datagram);
             let taken = take(reader, assembler, place);
@@ -170,11 +179,7 @@ impl FrameFeed {
 }
 
 /// Hands complete sweeps on; whether there were any.
-fn take(
-    reader: &mut SweepReader,
-    assembler: &mut FrameAssembler,
-    place: &[Option<usize>],
-) -> bool {
+fn take(reader: &mut SweepReader, assembler: &mut FrameAssembler, place: &[Option<usize>]) -> bool {
     let mut any = false;
     while let Some(mut sweep) = reader.pop() {
         let number = sweep.lidar;

@@ -52,7 +52,8 @@ impl FrameParams {
                 let ranges = arrays::pairs("distances_m", ranges)?.iter();
                 let division = |range: &[f64; 2]| {
                     let seen = !range[0].is_nan();
-                    seen.then(|| Intervals::new(range[0], range[1], intervals)).transpose()
+                    seen.then(|| Intervals::new(range[0], range[1], intervals))
+                        .transpose()
                 };
                 RadiusRule::Intervals(ranges.map(division).collect::<Result<_, _>>()?)
             }
@@ -77,6 +78,9 @@ impl FrameParams {
 impl FrameParams {
     /// The parameters for lidars at these places, metres, world frame.
     pub fn core(&self, sensors_m: Vec<Point3<f64>>) -> Core {
-        Core { sensors_m, ..self.0.clone() }
+        Core {
+            sensors_m,
+            ..self.0.clone()
+        }
     }
 }

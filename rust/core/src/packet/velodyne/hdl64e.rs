@@ -64,10 +64,11 @@ pub struct Hdl64e {
 }
 
 impl Hdl64e {
-    fn rotation(&self, packet: &Packet<'_>) -> Rotation {
+    fn rotation(&self, packet: &Packet<'_>, mean_rate_rad_per_ns: f64) -> Rotation {
         let stride = BANKS * mode(packet).returns();
         let rows = (0..BLOCKS).step_by(stride);
-        Rotation::new(rows.map(|block| packet.azimuth_centideg(block)), self.row_ns)
+        let azimuths = rows.map(|block| packet.azimuth_centideg(block));
+        Rotation::new(azimuths, self.row_ns, mean_rate_rad_per_ns)
     }
 
     fn delay_ns(&self, channel: usize) -> i64 {
@@ -130,7 +131,7 @@ impl Model for Hdl64e {
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
         let packet = Packet::new(payload)?;
-        let rotation = self.rotation(&packet);
+        let rotation = self.rotation(&packet, 0.0);
         rotation.is_valid(0).then(|| Head {
             device_ns: i64::from(packet.timestamp_us()) * 1000,
             sequence: None,
@@ -261,7 +262,7 @@ impl Decoder for Hdl64eDecoder {
         let Some(packet) = Packet::new(payload) else {
             return out.drops.add("packet_size", 1);
         };
-        let rotation = self.model.rotation(&packet);
+        let rotation = self.model.rotation(&packet, place.mean_rate_rad_per_ns);
         let mode = mode(&packet);
         let returns = mode.returns();
         let expected = BLOCKS / returns;

@@ -212,6 +212,7 @@ mod tests {
         let place = Place {
             time: Timestamp(1_000_000),
             packet: 9,
+            mean_rate_rad_per_ns: 0.0,
         };
         decoder.decode(&bytes, place, &mut out);
         let [echo] = out.returns[..] else {

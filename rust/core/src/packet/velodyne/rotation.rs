@@ -28,7 +28,13 @@ impl Rotation {
     ///
     /// Where one step is far off the others the sensor left out a part of the turn: the rows behind
     /// it were shot later by the time it takes to turn through, and the rate comes from the rest.
-    pub fn new(azimuths_centideg: impl Iterator<Item = u16>, row_ns: i64) -> Self {
+    /// A few rows tell the rate to some 0.3 % only, which is much over a long gap: there
+    /// `mean_rate_rad_per_ns` over many packets is better, where it is known (above 0).
+    pub fn new(
+        azimuths_centideg: impl Iterator<Item = u16>,
+        row_ns: i64,
+        mean_rate_rad_per_ns: f64,
+    ) -> Self {
         let mut raw = [0; MAX_ROWS];
         let mut rows = 0;
         for (place, azimuth) in raw.iter_mut().zip(azimuths_centideg) {
@@ -55,20 +61,26 @@ impl Rotation {
             duration_ns: 0,
             left_out: None,
         };
-        let mut gap_ns = 0;
+        let over_gap = if mean_rate_rad_per_ns > 0.0 {
+            mean_rate_rad_per_ns
+        } else {
+            rate
+        };
+        let (mut gap_ns, mut gap_rad) = (0, 0.0);
         for row in 0..rows {
             rotation.azimuth_rad[row] = f64::from(raw[row]) * RAD_PER_CENTIDEG;
             rotation.valid[row] = raw[row] < TURN_CENTIDEG;
             rotation.start_ns[row] = row as i64 * row_ns + gap_ns;
             let step = steps[row];
-            if row + 1 < rows && !is_usual(step) && rate > 0.0 {
+            if row + 1 < rows && !is_usual(step) && over_gap > 0.0 {
                 let excess_rad = (f64::from(step) - row_step) * RAD_PER_CENTIDEG;
                 rotation.leave_out((row + 1) as f64 * row_step * RAD_PER_CENTIDEG, excess_rad);
-                gap_ns += (excess_rad / rate) as i64;
+                gap_ns += (excess_rad / over_gap) as i64;
+                gap_rad += excess_rad;
             }
         }
         rotation.duration_ns = rows as i64 * row_ns + gap_ns;
-        rotation.turned_rad = rate * rotation.duration_ns as f64;
+        rotation.turned_rad = rows as f64 * row_step * RAD_PER_CENTIDEG + gap_rad;
         rotation
     }
 
@@ -153,7 +165,7 @@ mod tests {
 
     #[test]
     fn the_seam_is_no_gap() {
-        let rotation = Rotation::new((0..12).map(|row| (35_800 + row * 40) % 36_000), ROW_NS);
+        let rotation = Rotation::new((0..12).map(|row| (35_800 + row * 40) % 36_000), ROW_NS, 0.0);
         assert!((degrees(rotation.rate_rad_per_ns()) * ROW_NS as f64 - 0.4).abs() < 1e-9);
         assert_eq!(rotation.duration_ns(), 12 * ROW_NS);
         assert!((degrees(rotation.turned_rad()) - 4.8).abs() < 1e-9);
@@ -164,7 +176,7 @@ mod tests {
     fn a_gap_of_the_field_of_view_does_not_bend_the_rest() {
         // 0.4 degrees a row; between rows 4 and 5 the sensor leaves out 180 degrees.
         let azimuth = |row: u16| (26_000 + row * 40 + if row > 4 { 18_000 } else { 0 }) % 36_000;
-        let rotation = Rotation::new((0..12).map(azimuth), ROW_NS);
+        let rotation = Rotation::new((0..12).map(azimuth), ROW_NS, 0.0);
         assert!((degrees(rotation.rate_rad_per_ns()) * ROW_NS as f64 - 0.4).abs() < 1e-9);
         // 180 degrees at 0.4 degrees a row are 450 rows.
         let late = rotation.start_ns(5) - 5 * ROW_NS;
@@ -178,9 +190,9 @@ mod tests {
 
     #[test]
     fn a_standing_rotor_and_noise_are_survived() {
-        let standing = Rotation::new([7, 7, 6, 7, 7, 7].into_iter(), ROW_NS);
+        let standing = Rotation::new([7, 7, 6, 7, 7, 7].into_iter(), ROW_NS, 0.0);
         assert!(standing.rate_rad_per_ns().abs() * (ROW_NS as f64) < 1e-4);
-        let noise = Rotation::new([65_535, 0, 36_000, 12, 40_000, 3].into_iter(), ROW_NS);
+        let noise = Rotation::new([65_535, 0, 36_000, 12, 40_000, 3].into_iter(), ROW_NS, 0.0);
         assert!(!noise.is_valid(0) && noise.is_valid(1) && !noise.is_valid(6));
     }
 }

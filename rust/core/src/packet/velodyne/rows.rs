@@ -38,7 +38,7 @@ impl Firing {
     /// Times and angles of a data packet.
     pub fn head(&self, payload: &[u8]) -> Option<Head> {
         let packet = Packet::new(payload)?;
-        let rotation = self.rotation(&packet);
+        let rotation = self.rotation(&packet, 0.0);
         rotation.is_valid(0).then(|| Head {
             device_ns: i64::from(packet.timestamp_us()) * 1000,
             sequence: None,
@@ -67,10 +67,10 @@ impl Firing {
         }))
     }
 
-    fn rotation(&self, packet: &Packet<'_>) -> Rotation {
+    fn rotation(&self, packet: &Packet<'_>, mean_rate_rad_per_ns: f64) -> Rotation {
         let rows = (0..BLOCKS).step_by(packet.return_mode().returns());
         let azimuths = rows.map(|block| packet.azimuth_centideg(block));
-        Rotation::new(azimuths, self.row_ns())
+        Rotation::new(azimuths, self.row_ns(), mean_rate_rad_per_ns)
     }
 }
 
@@ -164,7 +164,7 @@ impl Decoder for RowsDecoder {
         let Some(packet) = Packet::new(payload) else {
             return out.drops.add("packet_size", 1);
         };
-        let rotation = self.firing.rotation(&packet);
+        let rotation = self.firing.rotation(&packet, place.mean_rate_rad_per_ns);
         let mode = packet.return_mode();
         let stride = mode.returns();
         for row in 0..BLOCKS / stride {
