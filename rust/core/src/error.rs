@@ -35,7 +35,9 @@ impl Coded for InvalidValue {
 #[derive(Debug, Clone, Error, PartialEq, Eq)]
 pub enum UnitError {
     /// The model means nothing without the calibration of the unit.
-    #[error("{model}: no points without the calibration of the unit, and neither a file nor the packets give one")]
+    #[error(
+        "{model}: no points without the calibration of the unit, and neither a file nor the packets give one"
+    )]
     Missing {
         /// Name of the model.
         model: &'static str,

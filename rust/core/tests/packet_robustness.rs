@@ -4,7 +4,9 @@
 mod puck;
 
 use lidar_deflect_core::packet::velodyne::position::Position;
-use lidar_deflect_core::packet::velodyne::puck::{PRODUCT_HIRES, PRODUCT_VLP16, VLP16, VLP16_HIRES};
+use lidar_deflect_core::packet::velodyne::puck::{
+    PRODUCT_HIRES, PRODUCT_VLP16, VLP16, VLP16_HIRES,
+};
 use lidar_deflect_core::packet::velodyne::{BLOCKS, RawBlock, RawReturn, encode};
 use lidar_deflect_core::packet::{
     Decoded, MODELS, ModelRef, Place, ReturnMode, closest, companion, model,

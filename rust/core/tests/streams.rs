@@ -405,6 +405,7 @@ fn a_named_model_overrides_its_factory_bytes() {
             Source::parse("192.168.1.201").unwrap(),
             model("vlp16").unwrap(),
         )],
+        units: Vec::new(),
         split: vec![],
     };
     let report = scan(&sent, options);

@@ -31,7 +31,9 @@ pub fn judge(mode: ReturnMode, echoes: &[RawEcho]) -> (Meanings, u32) {
         if echo.range == 0 {
             continue;
         }
-        let same = distinct[..count].iter().find(|k| echoes[**k].range == echo.range);
+        let same = distinct[..count]
+            .iter()
+            .find(|k| echoes[**k].range == echo.range);
         match same {
             Some(first) => {
                 merged += 1;
@@ -126,8 +128,14 @@ mod tests {
     #[test]
     fn distance_tells_last_and_first_in_either_order() {
         let dual = |echoes: &[_]| kinds(ReturnMode::Dual, echoes).0;
-        assert_eq!(dual(&[(900, 1), (400, 9)]), [Some(Last), Some(Strongest), None]);
-        assert_eq!(dual(&[(400, 9), (900, 1)]), [Some(Strongest), Some(Last), None]);
+        assert_eq!(
+            dual(&[(900, 1), (400, 9)]),
+            [Some(Last), Some(Strongest), None]
+        );
+        assert_eq!(
+            dual(&[(400, 9), (900, 1)]),
+            [Some(Strongest), Some(Last), None]
+        );
         let first_last = kinds(ReturnMode::FirstLast, &[(900, 1), (400, 9)]).0;
         assert_eq!(first_last, [Some(Last), Some(First), None]);
         let first_strongest = kinds(ReturnMode::FirstStrongest, &[(4, 1), (9, 9)]).0;

@@ -40,6 +40,14 @@ pub static MODELS: &[ModelRef] = &[
     &hesai::xt::XT32M2X,
     &hesai::xt::QT64,
     &hesai::qt128::QT128,
+    &hesai::pandar128::PANDAR128,
+    &hesai::pandar128::PANDAR90,
+    &hesai::pandar128::OT128,
+    &hesai::pandar128::JT128,
+    &hesai::at128::AT128,
+    &hesai::atx::ATX,
+    &hesai::ft120::FT120,
+    &hesai::jt16::JT16,
 ];
 
 /// What the library must know of one sensor model.

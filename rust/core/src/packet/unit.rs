@@ -39,14 +39,29 @@ impl UnitFile {
     /// What it looks like, for messages.
     pub fn first_line(&self) -> String {
         let Some(text) = self.text() else {
-            return format!("{} bytes that begin with {:02x?}", self.content.len(), &self.content[..self.content.len().min(8)]);
+            return format!(
+                "{} bytes that begin with {:02x?}",
+                self.content.len(),
+                &self.content[..self.content.len().min(8)]
+            );
         };
-        let line: String = text.lines().next().unwrap_or_default().chars().take(60).collect();
+        let line: String = text
+            .lines()
+            .next()
+            .unwrap_or_default()
+            .chars()
+            .take(60)
+            .collect();
         format!("text that begins with {line:?}")
     }
 
     /// An error about this file.
-    pub fn refuse(&self, line: Option<usize>, expected: impl Into<String>, found: impl Into<String>) -> UnitError {
+    pub fn refuse(
+        &self,
+        line: Option<usize>,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> UnitError {
         UnitError::Malformed {
             file: self.name.clone(),
             place: line.map_or_else(String::new, |line| format!(", line {line}")),
@@ -87,7 +102,9 @@ impl Calibration {
     pub fn describe(&self) -> String {
         match self {
             Self::Factory => "factory table".into(),
-            Self::Nominal { obtain } => format!("nominal table, unit calibration missing: {obtain}"),
+            Self::Nominal { obtain } => {
+                format!("nominal table, unit calibration missing: {obtain}")
+            }
             Self::Unit { names } => names.join(", "),
         }
     }

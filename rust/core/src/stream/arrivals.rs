@@ -189,11 +189,13 @@ impl<T> Arrivals<T> {
 
     /// Whether the device clock was set while the sequence number went on.
     fn is_clock_set(&self, ticket: &Ticket) -> bool {
-        self.last.filter(|_| ticket.head.sequence.is_some()).is_some_and(|last| {
-            let device_ns = ticket.device - last.start;
-            let host_ns = ticket.arrival - last.arrival;
-            device_ns.saturating_sub(host_ns).saturating_abs() > CLOCK_SET_NS
-        })
+        self.last
+            .filter(|_| ticket.head.sequence.is_some())
+            .is_some_and(|last| {
+                let device_ns = ticket.device - last.start;
+                let host_ns = ticket.arrival - last.arrival;
+                device_ns.saturating_sub(host_ns).saturating_abs() > CLOCK_SET_NS
+            })
     }
 
     /// Tells how fast the rotor turns from the packet before, where one packet alone cannot.

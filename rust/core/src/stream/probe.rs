@@ -1,7 +1,7 @@
 //! Which model a stream's packets are of: by their identifying bytes, and by the packet period where
 //! those are not believed.
 
-use crate::packet::{Head, ModelRef, claimants};
+use crate::packet::{Head, MODELS, ModelRef, PacketKind, claimants};
 use crate::time::Timestamp;
 
 /// Packets after which a stream is decided.
@@ -27,7 +27,9 @@ impl Choice {
     fn among(models: &[ModelRef]) -> Option<Self> {
         let (model, others) = models.split_first()?;
         let mut choice = Self::one(*model);
-        choice.candidates.extend(others.iter().map(|other| other.id()));
+        choice
+            .candidates
+            .extend(others.iter().map(|other| other.id()));
         Some(choice)
     }
 }
@@ -75,12 +77,12 @@ impl Probe {
     /// A model whose bytes are not believed has to have the packet period of the data, and of several
     /// that do the nearest is taken. Where there are too few packets to tell, all are candidates.
     pub fn decide(&self) -> Option<Choice> {
-        let (_, first) = self.packets.first()?;
+        self.packets.first()?;
         if let Some(model) = self.named {
             return Some(Choice::one(model));
         }
-        let claimants: Vec<ModelRef> = claimants(first).collect();
-        let is_sure = |model: &&ModelRef| self.packets.iter().all(|(_, p)| model.is_sure(p));
+        let claimants = self.claimants();
+        let is_sure = |model: &&ModelRef| self.own(**model).all(|payload| model.is_sure(payload));
         if let Some(model) = claimants.iter().find(is_sure) {
             return Some(Choice::one(*model));
         }
@@ -88,16 +90,32 @@ impl Probe {
         if errors.iter().all(Option::is_none) {
             return Choice::among(&claimants);
         }
-        let known = claimants.iter().zip(&errors).filter_map(|(model, error)| Some((*model, (*error)?)));
+        let known = claimants
+            .iter()
+            .zip(&errors)
+            .filter_map(|(model, error)| Some((*model, (*error)?)));
         let fitting = known.filter(|(_, error)| *error < PERIOD_TOLERANCE);
         let nearest = fitting.min_by(|(_, one), (_, other)| one.total_cmp(other));
         nearest.map(|(model, _)| Choice::one(model))
     }
 
+    /// Models that claim the most of the packets: a stray one does not count.
+    fn claimants(&self) -> Vec<ModelRef> {
+        let count = |model: &ModelRef| self.own(*model).count();
+        let most = MODELS.iter().map(count).max().unwrap_or(0).max(1);
+        let likely = MODELS.iter().filter(|model| count(model) == most);
+        likely.copied().collect()
+    }
+
+    /// Data packets of a model.
+    fn own(&self, model: ModelRef) -> impl Iterator<Item = &[u8]> {
+        let payloads = self.packets.iter().map(|(_, payload)| payload.as_slice());
+        payloads.filter(move |payload| model.recognise(payload) == Some(PacketKind::Data))
+    }
+
     /// Why nothing was decided although packets were claimed.
     pub fn doubt(&self) -> Option<(String, ModelRef)> {
-        let (_, first) = self.packets.first()?;
-        let model = claimants(first).next()?;
+        let model = self.claimants().into_iter().next()?;
         let found_us = self.period_ns(model)? / 1000.0;
         let title = model.title();
         let why = format!("the bytes fit {title}, the packet period of {found_us:.0} us does not");
@@ -112,7 +130,7 @@ impl Probe {
     /// How far the packet period of the data is off the model's, as a share; `None` where there are too
     /// few packets to tell.
     fn period_error(&self, model: ModelRef) -> Option<f64> {
-        let head = self.packets.iter().find_map(|(_, p)| model.head(p))?;
+        let head = self.own(model).find_map(|payload| model.head(payload))?;
         let period_ns = model.period_ns(head.return_mode) as f64;
         Some((self.period_ns(model)? / period_ns - 1.0).abs())
     }
@@ -120,9 +138,8 @@ impl Probe {
     /// Median step of device time; `None` for fewer than three steps.
     fn period_ns(&self, model: ModelRef) -> Option<f64> {
         let heads: Vec<Head> = self
-            .packets
-            .iter()
-            .filter_map(|(_, p)| model.head(p))
+            .own(model)
+            .filter_map(|payload| model.head(payload))
             .collect();
         let steps = heads
             .windows(2)

@@ -5,9 +5,9 @@ use std::net::IpAddr;
 use super::{ScanOptions, StreamKey};
 use crate::clock::ClockModel;
 use crate::drops::Drops;
+use crate::error::UnitError;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
-use crate::error::UnitError;
 use crate::packet::ModelRef;
 use crate::packet::unit::{Calibration, UnitFile};
 use crate::packet::velodyne::position::Pps;
@@ -186,7 +186,11 @@ impl ScanReport {
                 let models: Vec<&str> = lidars().map(|lidar| lidar.model.title()).collect();
                 return Err(UnitError::NotTaken {
                     file: given.file.name.clone(),
-                    models: if models.is_empty() { "a lidar that is in the capture".into() } else { models.join(", ") },
+                    models: if models.is_empty() {
+                        "a lidar that is in the capture".into()
+                    } else {
+                        models.join(", ")
+                    },
                     found: given.file.first_line(),
                 });
             }

@@ -11,8 +11,8 @@ use crate::clock::ClockEstimator;
 use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
-use crate::packet::velodyne::position::{Position, Pps};
 use crate::packet::unit::{Calibration, Gather, UnitFile};
+use crate::packet::velodyne::position::{Position, Pps};
 use crate::packet::{ModelRef, PacketKind, Tally, closest, companion};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 
@@ -182,7 +182,10 @@ impl Scan {
     /// Adds what is known of the unit: the user's files, else what its own packets say.
     fn with_unit(&self, mut info: StreamInfo, lidar: &Lidar) -> StreamInfo {
         let mut files = self.options.unit_files(&info.key);
-        let same = self.streams.iter().filter(|(other, _)| other.address == info.key.address);
+        let same = self
+            .streams
+            .iter()
+            .filter(|(other, _)| other.address == info.key.address);
         files.extend(same.filter_map(|(_, stream)| stream.metadata.clone()));
         files.extend(lidar.gather.as_ref().and_then(|gather| gather.file()));
         files.retain(|file| info.model.takes(file));
@@ -587,6 +590,12 @@ impl Lidar {
             let (packets, port, pps) = (facts.packets, facts.port, facts.pps.name());
             notes.push(format!(
                 "{packets} position packets to port {port}, pulse per second {pps}, {sentence}"
+            ));
+        }
+        if self.candidates.len() > self.model.candidates().len() {
+            let (model, others) = (self.model.id(), self.candidates.join(", "));
+            notes.push(format!(
+                "too few packets to tell {model} from {others}: name the model with --sensor"
             ));
         }
         let jumps = info.clock.segments().len().saturating_sub(1);

@@ -18,7 +18,11 @@ pub fn utc(bytes: [u8; 6], micros: u32) -> Timestamp {
         let year = i64::from(year) + if year < 70 { 2000 } else { 1900 };
         days(year, month, day) * DAY_S + hour * 3600 + minute * 60 + second
     };
-    Timestamp(seconds.saturating_mul(NANOS_PER_SECOND).saturating_add(i64::from(micros) * 1000))
+    Timestamp(
+        seconds
+            .saturating_mul(NANOS_PER_SECOND)
+            .saturating_add(i64::from(micros) * 1000),
+    )
 }
 
 /// Date bytes and microseconds of an instant: the inverse of [`utc`], in the calendar form.
@@ -70,15 +74,23 @@ mod tests {
     #[test]
     fn three_forms_of_the_date_are_told_apart() {
         // 2017-09-06 14:33:38, as a Pandar40P writes it.
-        assert_eq!(utc([17, 9, 6, 14, 33, 38], 898_262).0, 1_504_708_418_898_262_000);
+        assert_eq!(
+            utc([17, 9, 6, 14, 33, 38], 898_262).0,
+            1_504_708_418_898_262_000
+        );
         // 2020-01-16, as a Pandar64 does.
         assert_eq!(utc([120, 1, 16, 0, 0, 0], 0).0, 1_579_132_800_000_000_000);
-        assert_eq!(utc([0, 0, 0x65, 0x92, 0, 0x80], 1).0, 1_704_067_200_000_001_000);
+        assert_eq!(
+            utc([0, 0, 0x65, 0x92, 0, 0x80], 1).0,
+            1_704_067_200_000_001_000
+        );
     }
 
     #[test]
     fn what_is_written_is_read_over_leap_days_and_ends_of_years() {
-        for days in [0, 59, 10_956, 11_016, 18_321, 19_723, 20_088, 20_089, 47_540] {
+        for days in [
+            0, 59, 10_956, 11_016, 18_321, 19_723, 20_088, 20_089, 47_540,
+        ] {
             let time = Timestamp((days * DAY_S + 86_399) * NANOS_PER_SECOND + 999_999_000);
             let (date, micros) = bytes(time);
             assert_eq!(utc(date, micros), time, "day {days}: {date:?}");

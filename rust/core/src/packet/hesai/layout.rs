@@ -123,9 +123,14 @@ pub struct Tail {
     pub date: Option<usize>,
     /// Microseconds, u32.
     pub micros: usize,
-    /// Sequence number, u32.
+    /// Sequence number.
     pub sequence: usize,
+    /// Bytes of the sequence number: 2 or 4.
+    pub sequence_len: usize,
 }
+
+/// A place behind the end of every packet: what stands there is read as 0 and not written.
+pub const NOWHERE: usize = 1 << 16;
 
 /// A packet's layout.
 #[derive(Debug, Clone, Copy)]
@@ -168,7 +173,7 @@ impl<'a> View<'a> {
     pub fn new(payload: &'a [u8], layout: Layout) -> Option<Self> {
         let is_full = layout.blocks > 0 && layout.channels > 0;
         let blocks = layout.body + layout.blocks * layout.block_len;
-        let is_inside = blocks <= layout.tail && layout.tail < layout.len;
+        let is_inside = blocks.max(layout.tail) < layout.len;
         (payload.len() == layout.len && is_full && is_inside).then_some(Self { payload, layout })
     }
 
@@ -218,7 +223,10 @@ impl<'a> View<'a> {
 
     /// Mode of operation; 0 where the tail has none.
     pub fn operation(&self) -> u8 {
-        self.layout.fields.operation.map_or(0, |place| self.tail_byte(place))
+        self.layout
+            .fields
+            .operation
+            .map_or(0, |place| self.tail_byte(place))
     }
 
     /// State of the firing of a block, 0 to 3.
@@ -248,24 +256,38 @@ impl<'a> View<'a> {
         let Some(place) = self.layout.fields.date else {
             return Timestamp(i64::from(micros) * 1000);
         };
-        let date = tail.get(place..place + 6).and_then(|bytes| bytes.try_into().ok());
+        let date = tail
+            .get(place..place + 6)
+            .and_then(|bytes| bytes.try_into().ok());
         date::utc(date.unwrap_or_default(), micros)
     }
 
     /// Sequence number, where there is one.
     pub fn sequence(&self) -> Option<u32> {
-        let has_one = self.layout.has_sequence;
-        has_one.then(|| u32_at(self.tail(), self.layout.fields.sequence))
+        let Tail {
+            sequence,
+            sequence_len,
+            ..
+        } = self.layout.fields;
+        let read = || match sequence_len {
+            2 => u16_at(self.tail(), sequence).into(),
+            _ => u32_at(self.tail(), sequence),
+        };
+        self.layout.has_sequence.then(read)
     }
 }
 
 fn u16_at(bytes: &[u8], place: usize) -> u16 {
-    let pair = bytes.get(place..place + 2).and_then(|two| two.try_into().ok());
+    let pair = bytes
+        .get(place..place + 2)
+        .and_then(|two| two.try_into().ok());
     u16::from_le_bytes(pair.unwrap_or_default())
 }
 
 fn u32_at(bytes: &[u8], place: usize) -> u32 {
-    let four = bytes.get(place..place + 4).and_then(|four| four.try_into().ok());
+    let four = bytes
+        .get(place..place + 4)
+        .and_then(|four| four.try_into().ok());
     u32::from_le_bytes(four.unwrap_or_default())
 }
 
@@ -331,7 +353,8 @@ pub fn write(bytes: &mut [u8], layout: &Layout, packet: &RawPacket) {
         put(tail, place, &packet.azimuth_state.to_le_bytes());
     }
     if layout.has_sequence {
-        put(tail, fields.sequence, &packet.sequence.to_le_bytes());
+        let number = packet.sequence.to_le_bytes();
+        put(tail, fields.sequence, &number[..fields.sequence_len]);
     }
 }
 

@@ -2,10 +2,16 @@
 //!
 //! Source: the manuals of the models and the maker's development kit.
 
+pub mod at128;
+pub mod atx;
+mod dat;
 pub mod date;
+pub mod ft120;
+pub mod jt16;
 pub mod layout;
 mod modes;
 pub mod pandar;
+pub mod pandar128;
 pub mod qt128;
 pub mod rotating;
 pub mod unit;

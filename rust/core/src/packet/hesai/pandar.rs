@@ -4,10 +4,10 @@
 
 use std::sync::LazyLock;
 
+use super::layout::View;
 use super::layout::{Layout, Tail};
 use super::rotating::{Family, Rotating};
 use super::unit::Unit;
-use super::layout::View;
 use crate::packet::{Counting, ReturnMode};
 use crate::time::NANOS_PER_SECOND;
 
@@ -29,6 +29,7 @@ const TAIL: Tail = Tail {
     date: Some(16),
     micros: 10,
     sequence: 22,
+    sequence_len: 4,
 };
 
 static UNIT_40P: LazyLock<Unit> =
@@ -170,7 +171,11 @@ impl Family for Pandar {
     }
 
     fn template(&self) -> Vec<u8> {
-        let tail_len = if self.has_date { TAIL_LENS[0] } else { SHORT_TAIL_LEN };
+        let tail_len = if self.has_date {
+            TAIL_LENS[0]
+        } else {
+            SHORT_TAIL_LEN
+        };
         let mut bytes = vec![0; self.tail() + tail_len];
         if self.has_block_head() {
             let blocks = bytes.chunks_exact_mut(self.block_len()).take(self.blocks);

@@ -31,6 +31,7 @@ const TAIL: Tail = Tail {
     date: Some(15),
     micros: 21,
     sequence: 26,
+    sequence_len: 4,
 };
 
 static UNIT: LazyLock<Unit> =
@@ -77,7 +78,8 @@ impl Family for Qt128 {
 
     fn layout(&self, payload: &[u8]) -> Option<Layout> {
         let header = Header::new(payload)?;
-        let is_own = header.protocol == (3, 2) && (header.lasers, header.blocks) == (CHANNELS, BLOCKS);
+        let is_own =
+            header.protocol == (3, 2) && (header.lasers, header.blocks) == (CHANNELS, BLOCKS);
         let layout = layout(&header);
         (is_own && payload.len() == layout.len).then_some(layout)
     }

@@ -14,7 +14,10 @@ use crate::error::UnitError;
 use crate::packet::aim::{add, wrapped};
 use crate::packet::echoes::{MOST, RawEcho, judge};
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Counting, Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{
+    Counting, Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally,
+};
+use crate::time::Timestamp;
 
 const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 
@@ -72,6 +75,31 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
         }
     }
 
+    /// What a payload that is no data packet is to the model.
+    fn companion(&self, _payload: &[u8]) -> Option<PacketKind> {
+        None
+    }
+
+    /// Rotation rate; 0 where a packet does not tell it.
+    fn rate_rad_per_ns(&self, view: &View<'_>) -> f64 {
+        (view.rpm() * TAU / 60e9).max(0.0)
+    }
+
+    /// Azimuth of a block on the scale on which sweeps are cut.
+    fn encoder_rad(&self, view: &View<'_>, block: usize) -> Option<f64> {
+        self.azimuth_rad(view, block)
+    }
+
+    /// Whether a file describes a unit, where it is not the maker's text files that do.
+    fn takes_binary(&self, _file: &UnitFile) -> bool {
+        false
+    }
+
+    /// A decoder for the unit of such a file; `None`: the one that all models with blocks share.
+    fn fit_binary(&self, _files: &[UnitFile]) -> Option<Result<Fitted, UnitError>> {
+        None
+    }
+
     /// Bytes of an empty packet with its header.
     fn template(&self) -> Vec<u8>;
 }
@@ -105,7 +133,8 @@ impl<F: Family> Model for Rotating<F> {
     }
 
     fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
-        self.view(payload).map(|_| PacketKind::Data)
+        let data = self.view(payload).map(|_| PacketKind::Data);
+        data.or_else(|| self.0.companion(payload))
     }
 
     fn fits(&self, payload: &[u8]) -> bool {
@@ -118,12 +147,12 @@ impl<F: Family> Model for Rotating<F> {
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
         let view = self.view(payload)?;
-        let rate_rad_per_ns = (view.rpm() * TAU / 60e9).max(0.0);
+        let rate_rad_per_ns = self.0.rate_rad_per_ns(&view);
         let duration_ns = self.0.duration_ns(&view);
         Some(Head {
             device_ns: (view.time() + self.0.block_ns(&view, 0)).0,
             sequence: view.sequence(),
-            azimuth_rad: self.0.azimuth_rad(&view, 0)?,
+            azimuth_rad: self.0.encoder_rad(&view, 0)?,
             turned_rad: rate_rad_per_ns * duration_ns as f64,
             rate_rad_per_ns,
             duration_ns,
@@ -161,12 +190,20 @@ impl<F: Family> Model for Rotating<F> {
             Some(Kind::Angles) => {
                 unit::angle_channels(file) == Some(self.0.nominal().elevation_rad.len())
             }
-            Some(Kind::FireTimes) => self.0.nominal().clone().with(std::slice::from_ref(file)).is_ok(),
-            Some(Kind::Channels) | None => false,
+            Some(Kind::FireTimes) => self
+                .0
+                .nominal()
+                .clone()
+                .with(std::slice::from_ref(file))
+                .is_ok(),
+            Some(Kind::Channels) | None => self.0.takes_binary(file),
         }
     }
 
     fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
+        if let Some(fitted) = self.0.fit_binary(files) {
+            return fitted;
+        }
         let (unit, calibration) = self.0.nominal().clone().with(files)?;
         Ok(Fitted {
             decoder: Box::new(RotatingDecoder::new(self.0, &unit)),
@@ -176,13 +213,17 @@ impl<F: Family> Model for Rotating<F> {
 }
 
 /// First blocks of the firings; blocks behind the last whole firing are left over.
-fn firings(view: &View<'_>) -> impl Iterator<Item = usize> + use<> {
+pub fn firings(view: &View<'_>) -> impl Iterator<Item = usize> + use<> {
     let returns = view.return_mode().returns();
     (0..view.layout().blocks / returns).map(move |firing| firing * returns)
 }
 
 /// Echoes of the shots of a firing, by channel; ranges below the least are no echo.
-fn shots<'a>(view: &View<'a>, first: usize, least: u16) -> impl Iterator<Item = [RawEcho; MOST]> + 'a {
+fn shots<'a>(
+    view: &View<'a>,
+    first: usize,
+    least: u16,
+) -> impl Iterator<Item = [RawEcho; MOST]> + 'a {
     let returns = view.return_mode().returns();
     let mut blocks = [0, 1, 2].map(|place: usize| view.echoes(first + place.min(returns - 1)));
     std::iter::from_fn(move || {
@@ -237,7 +278,11 @@ impl<F: Family> RotatingDecoder<F> {
         Self {
             family,
             azimuth_rad: unit.azimuth_rad.clone(),
-            elevation: unit.elevation_rad.iter().map(|angle| angle.sin_cos()).collect(),
+            elevation: unit
+                .elevation_rad
+                .iter()
+                .map(|angle| angle.sin_cos())
+                .collect(),
             aims: vec![never; delays_ns.len()],
             delays_ns,
         }
@@ -264,41 +309,93 @@ impl<F: Family> RotatingDecoder<F> {
 
     fn firing(&mut self, view: &View<'_>, first: usize, place: Place, out: &mut Decoded) {
         let Some(block_rad) = self.family.azimuth_rad(view, first) else {
-            return out.drops.add("block_invalid", view.return_mode().returns() as u64);
+            return out
+                .drops
+                .add("block_invalid", view.return_mode().returns() as u64);
         };
-        let mode = view.return_mode();
         let (far, near) = self.family.fire_times(view, first);
         let [far, near] = [far, near].map(|table| self.aim(table, view.rpm()));
-        let since_ns = self.family.block_ns(view, first) - self.family.block_ns(view, 0);
-        let time = place.time + since_ns;
-        let head = block_rad.sin_cos();
+        let (head, near_m) = (block_rad.sin_cos(), self.family.near_m());
+        let firing = Firing {
+            first,
+            encoder_rad: self.family.encoder_rad(view, first).unwrap_or(block_rad),
+            time: place.time + (self.family.block_ns(view, first) - self.family.block_ns(view, 0)),
+            least_range: self.family.least_range(),
+            packet: place.packet,
+        };
+        firing.place(view, out, |channel, range_m| {
+            let table = if range_m < near_m { near } else { far };
+            let aim = self.aims[table].aims.get(channel)?;
+            Some(Ray {
+                azimuth_rad: block_rad + aim.azimuth_rad,
+                azimuth: add(head, aim.sin_cos),
+                elevation: self.elevation[channel],
+                delay_ns: aim.delay_ns,
+            })
+        });
+    }
+}
+
+/// Where a shot goes and when, after its firing.
+#[derive(Debug, Clone, Copy)]
+pub struct Ray {
+    /// Azimuth, not far outside of one turn.
+    pub azimuth_rad: f64,
+    /// Its sine and cosine.
+    pub azimuth: (f64, f64),
+    /// Sine and cosine of the elevation.
+    pub elevation: (f64, f64),
+    /// After the firing.
+    pub delay_ns: i64,
+}
+
+/// One firing of all channels.
+#[derive(Debug, Clone, Copy)]
+pub struct Firing {
+    /// First of its blocks.
+    pub first: usize,
+    /// Azimuth on the scale on which sweeps are cut.
+    pub encoder_rad: f64,
+    /// When it began.
+    pub time: Timestamp,
+    /// Least value of a range that is an echo.
+    pub least_range: u16,
+    /// Number of the packet.
+    pub packet: u32,
+}
+
+impl Firing {
+    /// Places the echoes; `ray` gives the ray of a channel for a range in metres, `None` for no such channel.
+    pub fn place(
+        &self,
+        view: &View<'_>,
+        out: &mut Decoded,
+        ray: impl Fn(usize, f64) -> Option<Ray>,
+    ) {
+        let mode = view.return_mode();
         let unit_m = view.layout().unit_m;
-        let (near_m, least) = (self.family.near_m(), self.family.least_range());
-        for (channel, echoes) in shots(view, first, least).enumerate() {
-            let Some((sin_v, cos_v)) = self.elevation.get(channel).copied() else {
-                break;
-            };
+        for (channel, echoes) in shots(view, self.first, self.least_range).enumerate() {
             let (kinds, merged) = judge(mode, &echoes[..mode.returns()]);
             out.merged += u64::from(merged);
             for (number, (echo, kind)) in echoes.iter().zip(kinds).enumerate() {
-                let Some(return_kind) = kind else { continue };
                 let range_m = f64::from(echo.range) * unit_m;
-                let table = if range_m < near_m { near } else { far };
-                let aim = &self.aims[table].aims[channel];
-                let (sin, cos) = add(head, aim.sin_cos);
+                let (Some(return_kind), Some(ray)) = (kind, ray(channel, range_m)) else {
+                    continue;
+                };
+                let ((sin, cos), (sin_v, cos_v)) = (ray.azimuth, ray.elevation);
                 let level_m = range_m * cos_v;
-                out.encoder_rad.push(wrapped(block_rad));
+                out.encoder_rad.push(wrapped(self.encoder_rad));
                 out.returns.push(Return {
                     xyz_m: [level_m * sin, level_m * cos, range_m * sin_v].map(|v| v as f32),
-                    time: time + aim.delay_ns,
+                    time: self.time + ray.delay_ns,
                     range_m: range_m as f32,
-                    azimuth_rad: wrapped(block_rad + aim.azimuth_rad),
+                    azimuth_rad: wrapped(ray.azimuth_rad),
                     ring: channel as u16,
                     intensity: echo.intensity.into(),
                     return_index: number as u8,
                     return_kind,
-                    packet: place.packet,
-                    block: (first + number) as u16,
+                    packet: self.packet,
+                    block: (self.first + number) as u16,
                 });
             }
         }
@@ -312,7 +409,8 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             return out.drops.add("packet_size", 1);
         };
         let returns = view.return_mode().returns();
-        out.drops.add("block_invalid", (view.layout().blocks % returns) as u64);
+        out.drops
+            .add("block_invalid", (view.layout().blocks % returns) as u64);
         for first in firings(&view) {
             self.firing(&view, first, place, out);
         }

@@ -131,7 +131,10 @@ pub fn angle_channels(file: &UnitFile) -> Option<usize> {
         return None;
     }
     let table = Table::new(file)?;
-    let numbers = table.rows.iter().map(|(_, cells)| cells[0].parse::<usize>());
+    let numbers = table
+        .rows
+        .iter()
+        .map(|(_, cells)| cells[0].parse::<usize>());
     Some(numbers.filter(Result::is_ok).count())
 }
 
@@ -145,11 +148,20 @@ impl Table {
     /// `None` where no line has names of columns.
     fn new(file: &UnitFile) -> Option<Self> {
         let text = file.text()?;
-        let cells = |line: &str| line.split(',').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>();
-        let mut lines = text.lines().enumerate().map(|(n, line)| (n + 1, cells(line)));
+        let cells = |line: &str| {
+            line.split(',')
+                .map(|cell| cell.trim().to_owned())
+                .collect::<Vec<_>>()
+        };
+        let mut lines = text
+            .lines()
+            .enumerate()
+            .map(|(n, line)| (n + 1, cells(line)));
         let is_header = |cells: &[String]| {
             let first = cells[0].to_ascii_lowercase();
-            ["channel", "laser id", "loop1"].iter().any(|name| first.starts_with(name))
+            ["channel", "laser id", "loop1"]
+                .iter()
+                .any(|name| first.starts_with(name))
         };
         let (_, names) = lines.find(|(_, cells)| is_header(cells))?;
         let is_row = |cells: &[String]| cells.len() > 1 && cells[0].parse::<f64>().is_ok();
@@ -162,26 +174,44 @@ impl Table {
         let count = self.rows.len();
         let whole = |column: usize| {
             let values = self.column(file, 0, column, count)?;
-            let angles = values.iter().map(|value| value.map(|micros| (micros / 1000.0).to_radians()));
+            let angles = values
+                .iter()
+                .map(|value| value.map(|micros| (micros / 1000.0).to_radians()));
             let all: Option<Vec<f64>> = angles.collect();
-            all.ok_or_else(|| file.refuse(None, format!("channels 1 to {count}, each once"), "a gap"))
+            all.ok_or_else(|| {
+                file.refuse(None, format!("channels 1 to {count}, each once"), "a gap")
+            })
         };
         Ok((whole(1)?, whole(2)?))
     }
 
     /// Values of one column times 1000, by the 1-based numbers in another; 0 numbers nothing.
-    fn column(&self, file: &UnitFile, key: usize, value: usize, channels: usize) -> Result<FireTimes, UnitError> {
+    fn column(
+        &self,
+        file: &UnitFile,
+        key: usize,
+        value: usize,
+        channels: usize,
+    ) -> Result<FireTimes, UnitError> {
         let mut values = vec![None; channels];
         for (line, cells) in &self.rows {
             let (Some(key), Some(cell)) = (cells.get(key), cells.get(value)) else {
-                return Err(file.refuse(Some(*line), format!("{} cells", value + 1), cells.len().to_string()));
+                return Err(file.refuse(
+                    Some(*line),
+                    format!("{} cells", value + 1),
+                    cells.len().to_string(),
+                ));
             };
             if key == "0" || cell == "-" || cell.is_empty() {
                 continue;
             }
             let number = cell.parse::<f64>().ok().filter(|number| number.is_finite());
-            let number = number.ok_or_else(|| file.refuse(Some(*line), "a number", format!("{cell:?}")))?;
-            let place = key.parse::<usize>().ok().and_then(|number| number.checked_sub(1));
+            let number =
+                number.ok_or_else(|| file.refuse(Some(*line), "a number", format!("{cell:?}")))?;
+            let place = key
+                .parse::<usize>()
+                .ok()
+                .and_then(|number| number.checked_sub(1));
             match place.and_then(|place| values.get_mut(place)) {
                 Some(slot) => *slot = Some(number * 1000.0),
                 None => {
@@ -199,12 +229,18 @@ mod tests {
     use super::*;
 
     fn plain() -> Unit {
-        Unit::built_in("test", "Channel,Elevation,Azimuth,fire\n1,15,-1,6\n2,-15,1,-\n")
+        Unit::built_in(
+            "test",
+            "Channel,Elevation,Azimuth,fire\n1,15,-1,6\n2,-15,1,-\n",
+        )
     }
 
     #[test]
     fn rows_in_any_order_and_what_vendors_add_are_read() {
-        let angles = UnitFile::new("a", "\u{feff}EEFF,1,1\r\nLaser id,Elevation,Azimuth\r\n2,-14.5,1.25\r\n1,14,0\r\nab12ff\r\n");
+        let angles = UnitFile::new(
+            "a",
+            "\u{feff}EEFF,1,1\r\nLaser id,Elevation,Azimuth\r\n2,-14.5,1.25\r\n1,14,0\r\nab12ff\r\n",
+        );
         let times = UnitFile::new("t", "Channel,fire time(\u{3bc}s)\r\n2,-4.5\r\n1,3\r\n");
         let (unit, calibration) = plain().with(&[times, angles]).unwrap();
         assert!((unit.elevation_rad[1].to_degrees() + 14.5).abs() < 1e-12);
@@ -223,7 +259,10 @@ mod tests {
     #[test]
     fn loops_have_channels_of_their_own() {
         let table = "Channel,Elevation,Azimuth,loop1,loop2\n1,1,1,-,-\n2,2,2,-,-\n";
-        let file = UnitFile::new("t", "EEFF,1,1,\nHorizontal,1,LoopNum,2\nLoop1,Firetime1,Loop2,Firetime2\n2,0.6,1,1.5\n0,0,0,0\n");
+        let file = UnitFile::new(
+            "t",
+            "EEFF,1,1,\nHorizontal,1,LoopNum,2\nLoop1,Firetime1,Loop2,Firetime2\n2,0.6,1,1.5\n0,0,0,0\n",
+        );
         assert_eq!(kind(&file), Some(Kind::FireTimes));
         let (unit, _) = Unit::built_in("q", table).with(&[file]).unwrap();
         assert_eq!(unit.fire("loop1").unwrap(), &[None, Some(600.0)]);
@@ -232,7 +271,12 @@ mod tests {
 
     #[test]
     fn broken_files_are_refused_where_they_are_broken() {
-        let refuse = |text: &str| plain().with(&[UnitFile::new("a", text)]).unwrap_err().to_string();
+        let refuse = |text: &str| {
+            plain()
+                .with(&[UnitFile::new("a", text)])
+                .unwrap_err()
+                .to_string()
+        };
         assert!(refuse("Channel,Elevation,Azimuth\n1,14,0\n").contains("2 channels"));
         assert!(refuse("Channel,Elevation,Azimuth\n1,up,0\n2,1,1\n").contains("line 2"));
         assert!(refuse("Channel,Elevation,Azimuth\n1,1,0\n1,1,1\n").contains("each once"));

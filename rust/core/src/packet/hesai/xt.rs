@@ -21,6 +21,7 @@ const TAIL_XT: Tail = Tail {
     date: Some(13),
     micros: 19,
     sequence: 24,
+    sequence_len: 4,
 };
 const TAIL_QT: Tail = Tail {
     return_mode: 16,

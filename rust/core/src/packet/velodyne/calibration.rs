@@ -131,8 +131,16 @@ const NAMES: [(&str, &str, &str); 12] = [
     ("distance", "dist_correction", "distCorrection_"),
     ("distance_x", "dist_correction_x", "distCorrectionX_"),
     ("distance_y", "dist_correction_y", "distCorrectionY_"),
-    ("vertical", "vert_offset_correction", "vertOffsetCorrection_"),
-    ("horizontal", "horiz_offset_correction", "horizOffsetCorrection_"),
+    (
+        "vertical",
+        "vert_offset_correction",
+        "vertOffsetCorrection_",
+    ),
+    (
+        "horizontal",
+        "horiz_offset_correction",
+        "horizOffsetCorrection_",
+    ),
     ("focal_distance", "focal_distance", "focalDistance_"),
     ("focal_slope", "focal_slope", "focalSlope_"),
     ("min_intensity", "min_intensity", "minIntensity_"),
@@ -144,7 +152,11 @@ impl Item<'_> {
         let length = if self.is_xml { 0.01 } else { 1.0 };
         let angle = |name| {
             let value = self.number(file, name)?;
-            Ok(if self.is_xml { value.to_radians() } else { value })
+            Ok(if self.is_xml {
+                value.to_radians()
+            } else {
+                value
+            })
         };
         let metres = |name| self.number(file, name).map(|value| value * length);
         let near = |name: &'static str| {
@@ -180,16 +192,18 @@ fn items(text: &str) -> Vec<Item<'_>> {
     if text.contains("<px") {
         return xml_items(text);
     }
-    match text.split_once("lasers:") {
-        Some((_, rest)) if text.contains("vert_correction") => yaml_items(rest),
-        _ => Vec::new(),
+    if text.contains("vert_correction") {
+        yaml_items(text)
+    } else {
+        Vec::new()
     }
 }
 
 /// List items in block or flow style; a list ends where a line stands further left.
-fn yaml_items(list: &str) -> Vec<Item<'_>> {
+fn yaml_items(text: &str) -> Vec<Item<'_>> {
     let mut items: Vec<Item<'_>> = Vec::new();
-    for line in list.lines().skip(1) {
+    let lines = text.lines().skip_while(|line| !line.starts_with("lasers:"));
+    for line in lines.skip(1) {
         let line = line.split('#').next().unwrap_or_default();
         let trimmed = line.trim_start();
         if !trimmed.is_empty() && trimmed.len() == line.len() && !trimmed.starts_with('-') {
@@ -202,10 +216,14 @@ fn yaml_items(list: &str) -> Vec<Item<'_>> {
                 is_xml: false,
             });
         }
-        let Some(item) = items.last_mut() else { continue };
+        let Some(item) = items.last_mut() else {
+            continue;
+        };
         let content = if is_new { &trimmed[1..] } else { trimmed };
         for pair in content.split(['{', '}', ',']) {
-            let Some((key, value)) = pair.split_once(':') else { continue };
+            let Some((key, value)) = pair.split_once(':') else {
+                continue;
+            };
             let known = NAMES.iter().find(|(_, name, _)| *name == key.trim());
             if let Some((name, ..)) = known {
                 item.values.insert(name, value.trim());
@@ -271,11 +289,20 @@ mod tests {
             assert!(takes(&file, 2) && !takes(&file, 16));
             let lasers = lasers(&file).unwrap();
             assert_eq!(lasers[0].elevation_rad, 0.125);
-            assert_eq!((lasers[1].rotation_rad, lasers[1].elevation_rad), (0.5, -0.25));
+            assert_eq!(
+                (lasers[1].rotation_rad, lasers[1].elevation_rad),
+                (0.5, -0.25)
+            );
         }
         let flow = lasers(&UnitFile::new("unit.yaml", FLOW)).unwrap();
-        assert_eq!((flow[0].distance_m, flow[0].distance_x_m), (1.5, Some(1.25)));
-        assert_eq!((flow[1].distance_x_m, flow[0].vertical_offset_m), (None, 0.01));
+        assert_eq!(
+            (flow[0].distance_m, flow[0].distance_x_m),
+            (1.5, Some(1.25))
+        );
+        assert_eq!(
+            (flow[1].distance_x_m, flow[0].vertical_offset_m),
+            (None, 0.01)
+        );
     }
 
     #[test]
@@ -294,7 +321,12 @@ mod tests {
     #[test]
     fn broken_files_are_refused_with_what_was_expected() {
         let twice = UnitFile::new("u", BLOCK.replace("laser_id: 1", "laser_id: 0"));
-        assert!(lasers(&twice).unwrap_err().to_string().contains("each once"));
+        assert!(
+            lasers(&twice)
+                .unwrap_err()
+                .to_string()
+                .contains("each once")
+        );
         let word = UnitFile::new("u", BLOCK.replace("0.125", "up"));
         assert!(lasers(&word).unwrap_err().to_string().contains("\"up\""));
         assert!(!takes(&UnitFile::new("u", "lasers: none"), 0));

@@ -20,8 +20,16 @@ const FIRING: Firing = Firing {
     range_unit_m: 0.002,
 };
 
-const ELEVATION_DEG: [f64; CHANNELS] = [-30.67, -9.33, -29.33, -8.0, -28.0, -6.67, -26.67, -5.33, -25.33, -4.0, -24.0, -2.67, -22.67, -1.33, -21.33, 0.0, -20.0, 1.33, -18.67, 2.67, -17.33, 4.0, -16.0, 5.33, -14.67, 6.67, -13.33, 8.0, -12.0, 9.33, -10.67, 10.67];
-const VERTICAL_OFFSET_MM: [f64; CHANNELS] = [17.17, 4.76, 16.27, 4.07, 15.4, 3.38, 14.54, 2.7, 13.71, 2.02, 12.89, 1.35, 12.09, 0.67, 11.31, 0.0, 10.54, -0.67, 9.78, -1.35, 9.04, -2.02, 8.3, -2.7, 7.58, -3.38, 6.86, -4.07, 6.15, -4.76, 5.45, -5.45];
+const ELEVATION_DEG: [f64; CHANNELS] = [
+    -30.67, -9.33, -29.33, -8.0, -28.0, -6.67, -26.67, -5.33, -25.33, -4.0, -24.0, -2.67, -22.67,
+    -1.33, -21.33, 0.0, -20.0, 1.33, -18.67, 2.67, -17.33, 4.0, -16.0, 5.33, -14.67, 6.67, -13.33,
+    8.0, -12.0, 9.33, -10.67, 10.67,
+];
+const VERTICAL_OFFSET_MM: [f64; CHANNELS] = [
+    17.17, 4.76, 16.27, 4.07, 15.4, 3.38, 14.54, 2.7, 13.71, 2.02, 12.89, 1.35, 12.09, 0.67, 11.31,
+    0.0, 10.54, -0.67, 9.78, -1.35, 9.04, -2.02, 8.3, -2.7, 7.58, -3.38, 6.86, -4.07, 6.15, -4.76,
+    5.45, -5.45,
+];
 
 /// The HDL-32E.
 pub static HDL32E: Hdl32e = Hdl32e;
@@ -58,7 +66,8 @@ impl Model for Hdl32e {
     fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
         let packet = Packet::new(payload);
         let is_old = |packet: &Packet<'_>| {
-            [packet.return_mode_byte(), packet.product()] == NO_FACTORY_BYTES && packet.has_banks(&[0])
+            [packet.return_mode_byte(), packet.product()] == NO_FACTORY_BYTES
+                && packet.has_banks(&[0])
         };
         if packet.as_ref().is_some_and(is_old) {
             return Some(PacketKind::Data);

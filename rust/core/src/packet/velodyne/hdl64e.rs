@@ -79,7 +79,8 @@ impl Hdl64e {
 /// Dual return is not flagged: each azimuth then comes four times, not twice.
 fn mode(packet: &Packet<'_>) -> ReturnMode {
     let quads = (0..BLOCKS).step_by(2 * BANKS);
-    let mut same = quads.map(|block| packet.azimuth_centideg(block) == packet.azimuth_centideg(block + 2));
+    let mut same =
+        quads.map(|block| packet.azimuth_centideg(block) == packet.azimuth_centideg(block + 2));
     if same.all(|same| same) {
         ReturnMode::Dual
     } else {
@@ -186,7 +187,9 @@ impl Model for Hdl64e {
             calibration::lasers(file)?
         };
         let lowest_first = |laser: &Laser| {
-            let lower = lasers.iter().filter(|other| other.elevation_rad < laser.elevation_rad);
+            let lower = lasers
+                .iter()
+                .filter(|other| other.elevation_rad < laser.elevation_rad);
             lower.count() as u16
         };
         let channels = lasers.iter().enumerate().map(|(number, laser)| Channel {
@@ -246,8 +249,13 @@ impl Channel {
         let laser = &self.laser;
         let focus = (1.0 - laser.focal_distance_m / FOCAL_SCALE_M).powi(2);
         let here = (1.0 - f64::from(echo.range) / 65_535.0).powi(2);
-        let corrected = f64::from(echo.intensity) + 256.0 * laser.focal_slope * (focus - here).abs();
-        let most = if laser.max_intensity > 0.0 { laser.max_intensity } else { 255.0 };
+        let corrected =
+            f64::from(echo.intensity) + 256.0 * laser.focal_slope * (focus - here).abs();
+        let most = if laser.max_intensity > 0.0 {
+            laser.max_intensity
+        } else {
+            255.0
+        };
         corrected.max(laser.min_intensity).min(most) as u16
     }
 }
@@ -266,7 +274,8 @@ impl Decoder for Hdl64eDecoder {
         let mode = mode(&packet);
         let returns = mode.returns();
         let expected = BLOCKS / returns;
-        out.drops.add("block_invalid", (expected - usable(&packet).count()) as u64);
+        out.drops
+            .add("block_invalid", (expected - usable(&packet).count()) as u64);
         for (row, bank, block) in usable(&packet) {
             let channels = self.channels[bank * CHANNELS..][..CHANNELS].iter();
             let second = packet.returns(block + (returns - 1) * BANKS);
@@ -299,4 +308,3 @@ impl Decoder for Hdl64eDecoder {
         }
     }
 }
-

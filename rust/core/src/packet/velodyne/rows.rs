@@ -95,8 +95,16 @@ pub fn tally(payload: &[u8]) -> Tally {
     tally
 }
 
-/// What a payload is to the models with the product bytes `products`.
+/// What a payload is to the models of one bank with the product bytes `products`.
+///
+/// An HDL-64E may have any bytes there; its second block is of the second bank.
 pub fn recognise(payload: &[u8], products: &[u8]) -> Option<PacketKind> {
+    let is_of_two_banks = Packet::new(payload).is_some_and(|packet| packet.bank(1) == Some(1));
+    recognise_product(payload, products).filter(|_| !is_of_two_banks)
+}
+
+/// What a payload is to the models with the product bytes `products`.
+pub fn recognise_product(payload: &[u8], products: &[u8]) -> Option<PacketKind> {
     if position::Position::new(payload).is_some() {
         return Some(PacketKind::Position);
     }
@@ -223,7 +231,12 @@ pub struct Shots {
 
 impl Shots {
     /// A row at an azimuth and `place.time`.
-    pub fn new(row_azimuth_rad: f64, rate_rad_per_ns: f64, place: Place, range_unit_m: f64) -> Self {
+    pub fn new(
+        row_azimuth_rad: f64,
+        rate_rad_per_ns: f64,
+        place: Place,
+        range_unit_m: f64,
+    ) -> Self {
         Self {
             row_azimuth_rad,
             row_sin_cos: row_azimuth_rad.sin_cos(),
@@ -289,7 +302,13 @@ impl Shots {
     ///
     /// Which of the two is the brighter cannot be read from the intensity, which is corrected for
     /// range; so the nearer is called strongest even where the manual makes it the second strongest.
-    pub fn pair(&mut self, channel: &Channel, echoes: [RawReturn; 2], block: usize, out: &mut Decoded) {
+    pub fn pair(
+        &mut self,
+        channel: &Channel,
+        echoes: [RawReturn; 2],
+        block: usize,
+        out: &mut Decoded,
+    ) {
         self.aim(channel);
         let (kinds, merged) = judge(ReturnMode::Dual, &echoes);
         out.merged += u64::from(merged);

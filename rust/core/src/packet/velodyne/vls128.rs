@@ -106,7 +106,11 @@ fn channels(beams: &Beams, slot_ns: i64) -> Vec<Channel> {
 
 /// Sequences of a packet.
 fn sequences(mode: ReturnMode) -> usize {
-    if mode == ReturnMode::Dual { 1 } else { BLOCKS / BANKS }
+    if mode == ReturnMode::Dual {
+        1
+    } else {
+        BLOCKS / BANKS
+    }
 }
 
 /// First block of a bank in a sequence.
@@ -143,7 +147,7 @@ impl Model for Vls128 {
     }
 
     fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
-        rows::recognise(payload, &[PRODUCT])
+        rows::recognise_product(payload, &[PRODUCT])
     }
 
     fn fits(&self, payload: &[u8]) -> bool {
@@ -226,7 +230,9 @@ struct Vls128Decoder {
 impl Vls128Decoder {
     /// Learns slot and rate from the packet before, where that one is the neighbour.
     fn follow(&mut self, packet: &Packet<'_>, time: Timestamp) {
-        let Some(azimuth_rad) = azimuth(packet, 0) else { return };
+        let Some(azimuth_rad) = azimuth(packet, 0) else {
+            return;
+        };
         let slots = sequences(packet.return_mode()) as i64 * SLOTS;
         let found = self.last.and_then(|(last, last_rad)| {
             let elapsed_ns = time - last;
@@ -258,7 +264,8 @@ impl Decoder for Vls128Decoder {
         self.follow(&packet, place.time);
         let mode = packet.return_mode();
         let expected = sequences(mode) * BANKS;
-        out.drops.add("block_invalid", (expected - usable(&packet).count()) as u64);
+        out.drops
+            .add("block_invalid", (expected - usable(&packet).count()) as u64);
         for (sequence, block) in usable(&packet) {
             let after_ns = sequence as i64 * SLOTS * self.slot_ns - LEAD_NS;
             let place = Place {
