@@ -370,17 +370,24 @@ fn old_firmware_is_told_by_its_packet_period() {
     };
     let report = scan(&old.packets(0.5), ScanOptions::default());
     assert_eq!(report.lidars[0].model.id(), "vlp16");
-    // The same bytes at the pace of an HDL-32E are none.
+    // The same bytes at the pace of an HDL-32E are its own.
     let mut fast = old.packets(0.5);
     for (number, packet) in (0..).zip(&mut fast) {
         let stamp: u32 = 1_000_000 + number * 553;
         packet.payload[1200..1204].copy_from_slice(&stamp.to_le_bytes());
     }
     let report = scan(&fast, ScanOptions::default());
+    assert_eq!(report.lidars[0].model.id(), "hdl32e");
+    // At a pace of neither they are no lidar's.
+    for (number, packet) in (0..).zip(&mut fast) {
+        let stamp: u32 = 1_000_000 + number * 900;
+        packet.payload[1200..1204].copy_from_slice(&stamp.to_le_bytes());
+    }
+    let report = scan(&fast, ScanOptions::default());
     assert!(report.lidars.is_empty());
     let (model, why) = report.others[0].closest.clone().unwrap();
     assert_eq!(model, "vlp16");
-    assert!(why.contains("553 us"), "{why}");
+    assert!(why.contains("900 us"), "{why}");
 }
 
 #[test]

@@ -52,7 +52,7 @@ pub fn judge(mode: ReturnMode, echoes: &[RawEcho]) -> (Meanings, u32) {
 /// Labels the echoes at `distinct`, of which no two have the same range.
 fn label(mode: ReturnMode, echoes: &[RawEcho], distinct: &[usize], meanings: &mut Meanings) {
     if let [only] = distinct {
-        meanings[*only].get_or_insert(only_kind(mode));
+        meanings[*only].get_or_insert(only_kind(mode, *only));
         return;
     }
     let range = |place: &usize| echoes[*place].range;
@@ -87,8 +87,10 @@ fn by_brightness(echoes: &[RawEcho], near: usize, far: usize, place: usize) -> R
 }
 
 /// Meaning of the only echo.
-fn only_kind(mode: ReturnMode) -> ReturnKind {
+fn only_kind(mode: ReturnMode, place: usize) -> ReturnKind {
     match mode {
+        // Both last and strongest; the first place is the last return's on most models.
+        ReturnMode::Dual if place == 0 => ReturnKind::Last,
         ReturnMode::Last => ReturnKind::Last,
         ReturnMode::First => ReturnKind::First,
         ReturnMode::Second => ReturnKind::Second,

@@ -44,6 +44,8 @@ pub struct Gap {
     pub period_ns: i64,
     /// What they would have seen.
     pub arc: Arc,
+    /// Sequence numbers tell that they were sent.
+    pub is_numbered: bool,
     /// Host time around them.
     pub arrivals: (Timestamp, Timestamp),
 }
@@ -56,6 +58,9 @@ impl Gap {
         let is_pause = |pause: &Pause| pause.from >= before && pause.to <= after;
         if pauses.iter().rev().any(is_pause) {
             return 0;
+        }
+        if self.is_numbered {
+            return self.lost;
         }
         (self.lost as f64 * view.visible_share(self.arc)).round() as u64
     }
@@ -261,6 +266,7 @@ impl<T> Arrivals<T> {
                     from_rad: last.azimuth_rad,
                     width_rad: missing_ns as f64 * ticket.head.rate_rad_per_ns.max(0.0),
                 },
+                is_numbered: ticket.head.sequence.is_some(),
                 arrivals: (last.arrival, ticket.arrival),
             }
         });
