@@ -112,7 +112,7 @@ fn check(writer: &Writer, mode: ReturnMode, number: u32, echoes: &[RawEcho]) {
     let (blocks, channels) = writer.size;
     let echo = |block: usize, channel: usize| {
         // Two of three second returns differ from the first.
-        let block = if channel % 3 == 0 {
+        let block = if channel.is_multiple_of(3) {
             block / mode.returns() * mode.returns()
         } else {
             block
@@ -193,7 +193,7 @@ fn the_meaning_of_two_returns_does_not_depend_on_their_order() {
     {
         for is_far_first in [true, false] {
             let echo = |block: usize, _| RawEcho {
-                range: if (block % 2 == 0) == is_far_first {
+                range: if block.is_multiple_of(2) == is_far_first {
                     9_000
                 } else {
                     4_000

@@ -174,7 +174,7 @@ impl ContourPass {
         Ok(arrays::table(py, lengths, places.len())?)
     }
 
-    /// Points so far before the tip, (t, len(to_tip), 3), metres.
+    /// Points so far before the tip, `(t, len(to_tip), 3)`, metres.
     fn sections_m<'py>(
         &self,
         py: Python<'py>,

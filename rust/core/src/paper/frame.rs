@@ -33,15 +33,15 @@ pub struct FrameParams {
     pub model: RadiusModel,
     /// Step 6: the distance that goes into it.
     pub rule: RadiusRule,
-    /// Step 6: MinPts.
+    /// Step 6: `MinPts`.
     pub min_points: usize,
-    /// Step 6: core if more than MinPts, as printed, instead of at least.
+    /// Step 6: core if more than `MinPts`, as printed, instead of at least.
     pub strict: bool,
     /// Step 7: direction of the leading edge along the chord, world frame.
     pub leading_edge: Unit<Vector3<f64>>,
     /// Step 8: radius along one contour; `None` for 1.5 times the largest distance between lines.
     pub contour_radius_m: Option<f64>,
-    /// Step 8: MinPts along one contour.
+    /// Step 8: `MinPts` along one contour.
     pub contour_min_points: usize,
     /// Step 8: degree of the curve through a cluster and D of (13).
     pub line: LineParams,

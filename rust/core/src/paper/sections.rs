@@ -58,7 +58,7 @@ mod tests {
     fn contours() -> [ContourCurve; 2] {
         [1.0, -1.0].map(|side| {
             let samples: Vec<[f64; 3]> = (0..20)
-                .map(|i| f64::from(i))
+                .map(f64::from)
                 .map(|z| [0.75 * z + side, 2.0, z])
                 .collect();
             fit_contour(&samples, Degrees::new(1, 2).unwrap()).unwrap()

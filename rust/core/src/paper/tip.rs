@@ -111,9 +111,9 @@ fn first_root(f: impl Fn(f64) -> f64, from: f64, to: f64) -> Option<f64> {
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if (f(middle) > 0.0) == rising {
-            high = middle
+            high = middle;
         } else {
-            low = middle
+            low = middle;
         }
     }
     Some(0.5 * (low + high))

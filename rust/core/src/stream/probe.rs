@@ -114,12 +114,12 @@ impl Probe {
     }
 
     /// Why nothing was decided although packets were claimed.
-    pub fn doubt(&self) -> Option<(String, ModelRef)> {
+    pub fn doubt(&self) -> Option<String> {
         let model = self.claimants().into_iter().next()?;
         let found_us = self.period_ns(model)? / 1000.0;
         let title = model.title();
         let why = format!("the bytes fit {title}, the packet period of {found_us:.0} us does not");
-        Some((why, model))
+        Some(why)
     }
 
     /// The packets taken so far, in the order of arrival.

@@ -9,6 +9,9 @@ use lidar_deflect_core::packet::unit::UnitFile;
 use lidar_deflect_core::packet::velodyne::{self, BLOCKS, CHANNELS};
 use lidar_deflect_core::packet::{ModelRef, ReturnMode, model};
 
+/// Writes a packet.
+pub type Encode = Box<dyn Fn(&RawPacket) -> Vec<u8>>;
+
 /// A model with what writes its packets.
 pub struct Writer {
     pub model: ModelRef,
@@ -16,7 +19,7 @@ pub struct Writer {
     pub size: (usize, usize),
     /// Modes that the packets can tell.
     pub modes: &'static [ReturnMode],
-    pub encode: Box<dyn Fn(&RawPacket) -> Vec<u8>>,
+    pub encode: Encode,
 }
 
 const SINGLE: &[ReturnMode] = &[ReturnMode::Strongest];

@@ -16,7 +16,7 @@ use crate::error::UnitError;
 use crate::packet::aim::{add, turn, wrapped};
 use crate::packet::echoes::judge;
 use crate::packet::unit::{Calibration, Fitted, Gather, UnitFile};
-use crate::packet::{Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
 
 /// Lasers of one unit.
 pub const LASERS: usize = 64;
@@ -126,8 +126,8 @@ impl Model for Hdl64e {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        super::rows::misfit(payload)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {

@@ -16,7 +16,7 @@ use crate::angle::{wrap_half_turn, wrap_turn};
 use crate::error::{InvalidValue, UnitError};
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
 use crate::time::Timestamp;
 
 /// Lasers of one unit.
@@ -154,8 +154,8 @@ impl Model for Vls128 {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        rows::misfit(payload)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
