@@ -43,6 +43,7 @@ __all__ = [
     "scan_capture",
     "scan_quickly",
     "sensor_models",
+    "sensor_table",
     "walk_arc",
     "yaw_from_wall",
 ]
@@ -74,6 +75,7 @@ def scan_quickly(
     head_s: float,
 ) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
 def sensor_models() -> list[tuple[str, str]]: ...
+def sensor_table() -> list[list[str]]: ...
 
 @final
 class CaptureScan:

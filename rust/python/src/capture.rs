@@ -173,6 +173,20 @@ fn sensor_models() -> Vec<(&'static str, &'static str)> {
     models.map(|model| (model.id(), model.title())).collect()
 }
 
+/// What is decoded of each model and how that was proven: id, name, how it is recognised, returns,
+/// files of a unit, proof.
+#[pyfunction]
+fn sensor_table() -> Vec<[String; 6]> {
+    let rows = packet::proof::ROWS.iter();
+    rows.map(|row| {
+        let title = packet::model(row.id).map_or(row.id, |model| model.title());
+        let texts = [row.id, title, row.recognised, row.returns, row.unit];
+        let [id, title, recognised, returns, unit] = texts.map(str::to_owned);
+        [id, title, recognised, returns, unit, row.proof.describe()]
+    })
+    .collect()
+}
+
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<CaptureScan>()?;
     module.add_class::<sweeps::Sweep>()?;
@@ -182,5 +196,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
+    module.add_function(wrap_pyfunction!(sensor_table, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_models, module)?)
 }

@@ -8,6 +8,7 @@ pub mod aim;
 pub mod beams;
 pub mod echoes;
 pub mod hesai;
+pub mod proof;
 pub mod unit;
 pub mod velodyne;
 
