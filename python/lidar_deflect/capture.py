@@ -342,7 +342,7 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     paths = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
     _native.check_captures(paths)
     lidars = _lidars_of(config)
-    own = {lidar.source or "": lidar.beams for lidar in lidars if lidar.beams}
+    own = {lidar.source or "": files for lidar in lidars if (files := getattr(lidar, "beams", ()))}
     files = units.named(own | dict(beams or {})) + units.beside(paths)
     ids = {lidar.id: lidar.source for lidar in lidars}
     named = {lidar.source: lidar.model for lidar in lidars if lidar.source}

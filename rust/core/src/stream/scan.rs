@@ -276,8 +276,8 @@ impl Stream {
         match &mut self.state {
             State::Lidar(lidar) => lidar.finish(shared),
             State::Probing(probe) => {
-                if let Some(why) = probe.doubt() {
-                    self.closest = Some(Misfit { why, may_be: None });
+                if let Some(misfit) = probe.doubt() {
+                    self.closest = Some(misfit);
                 }
             }
         }
