@@ -1,7 +1,10 @@
 """Do clusters agree with scikit-learn, with the definition, and with themselves?"""
 
 import pickle
+import subprocess
+import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -291,3 +294,45 @@ def test_a_contour_of_noise_has_no_line() -> None:
     assert caught.value.code == "fit.no_cluster"
     with pytest.raises(InvalidValueError, match="labels"):
         line_clusters(np.zeros((4, 3)), np.zeros(3), degrees=(1, 1), reach_m=0.6)
+
+
+MEMORY = """
+import re, sys
+from pathlib import Path
+import numpy as np
+from lidar_deflect.clustering import dbscan
+
+def kilobytes(word):
+    return int(re.search(word + r":\\s+(\\d+)", Path("/proc/self/status").read_text())[1])
+
+count, per_point = int(sys.argv[1]), sys.argv[2] == "each"
+points = np.random.default_rng(0).random((count, 3), dtype=np.float32)
+points *= np.array([float(c) for c in sys.argv[3:6]], np.float32)
+radius_m = np.full(count, 0.1) if per_point else 0.1
+dbscan(points[:9], radius_m[:9] if per_point else 0.1, 4, threads=2)
+Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
+before = kilobytes("VmRSS")
+labels = dbscan(points, radius_m, 4, threads=2)
+print((kilobytes("VmHWM") - before) * 1024 / points.nbytes, labels.max())
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="reads peaks from /proc")
+@pytest.mark.parametrize(
+    ("count", "radii", "size_m"),
+    [
+        (1_500_000, "one", (60, 60, 1)),  # a handful of neighbours
+        (1_500_000, "one", (1, 1, 1)),  # six thousand neighbours each
+        (500_000, "each", (40, 40, 1)),
+        (8_000, "each", (0.05, 0.05, 0.05)),  # all are neighbours of all
+    ],
+)
+def test_memory_is_a_small_multiple_of_the_cloud(
+    count: int, radii: str, size_m: tuple[float, ...]
+) -> None:
+    command = [sys.executable, "-c", MEMORY, str(count), radii, *map(str, size_m)]
+    run = subprocess.run(command, capture_output=True, text=True, check=True)
+    multiple, last = run.stdout.split()
+    assert int(last) >= 0
+    small_bytes = 4e6  # threads and pools, whatever the cloud
+    assert float(multiple) < 6 + small_bytes / (12 * count)

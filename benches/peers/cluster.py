@@ -8,16 +8,17 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from lidar_deflect.clustering import dbscan
 from numpy.typing import NDArray
 from sklearn.cluster import DBSCAN
+
+from lidar_deflect.clustering import dbscan
 
 RADIUS_M = 0.15
 MIN_POINTS = 4
 
 
 def surface(count: int) -> NDArray[np.float32]:
-    """A wavy surface of 400 points per square metre, 2 cm of noise, one stray point in twenty."""
+    """Make a wavy surface: 400 points per square metre, 2 cm of noise, one in twenty astray."""
     rng = np.random.default_rng(1)
     side_m = np.sqrt(count / 400)
     x, z = rng.uniform(0, side_m, (2, count))

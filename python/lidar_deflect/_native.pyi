@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CaptureScan",
+    "ContourCurves",
     "ContourPass",
     "DistancePass",
     "FrameParams",
@@ -30,6 +31,8 @@ __all__ = [
     "fit_plane",
     "fit_polynomial",
     "line_clusters",
+    "line_extremes",
+    "pass_through",
     "polynomial_powers",
     "polynomial_slopes",
     "polynomial_values",
@@ -328,3 +331,24 @@ def arc_length(raw: _Curve, from_m: float, to_m: float, tolerance_m: float) -> f
 def walk_arc(raw: _Curve, from_m: float, length_m: float, tolerance_m: float) -> float: ...
 def curve_points(raw: _Curve, t_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
 def curve_distances(raw: _Curve, xyz: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def pass_through(xyz: NDArray[np.float32], box_m: NDArray[np.float64]) -> NDArray[np.bool_]: ...
+def line_extremes(
+    xyz: NDArray[np.float32], ring: NDArray[np.uint16], leading_edge: NDArray[np.float64]
+) -> tuple[NDArray[np.uint16], NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
+class ContourCurves:
+    def __new__(
+        cls,
+        leading_m: NDArray[np.float64],
+        trailing_m: NDArray[np.float64],
+        *,
+        degree_yoz: int,
+        degree_xoz: int,
+    ) -> ContourCurves: ...
+    def at(
+        self, z_m: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def tip(self, plane: str, max_u_m: float) -> tuple[float, float]: ...
+    def length_m(self, from_z_m: float, to_z_m: float) -> float: ...
+    def before_m(self, tip_z_m: float, length_m: float) -> list[float]: ...

@@ -27,9 +27,9 @@ def average(deflection: pl.DataFrame, holds: Sequence[Hold]) -> pl.DataFrame:
     Where half of a hold's states are `ok`, those count alone; else, where half are `ok` or
     `degraded`, those; else all that come from data of their moment, `extrapolated` ones too; only
     where there are none, `interpolated` ones. The row has the commonest status of what it averages,
-    with the commonest reason; one of which under half of the states could be used is never `ok`. Total deflections are the norms of the
-    averaged components. Uncertainties are averaged, not divided by the root of the count: what a
-    hold's states share does not average out.
+    with the commonest reason; one of which under half of the states could be used is never `ok`.
+    Total deflections are the norms of the averaged components. Uncertainties are averaged, not
+    divided by the root of the count: what a hold's states share does not average out.
 
     Parameters
     ----------

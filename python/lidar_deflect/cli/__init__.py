@@ -1,5 +1,6 @@
 """The command line: one file per command; heavy imports live inside the commands."""
 
+import signal
 import sys
 
 
@@ -12,4 +13,5 @@ def main() -> None:
     except KeyboardInterrupt:  # while the command line itself was still being loaded
         sys.stderr.write("error[interrupted]: interrupted; nothing half-written is left\n")
         code = 130
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # nothing is left to interrupt
     sys.exit(code)

@@ -79,6 +79,13 @@ def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code; nothing but its result is on stdout."""
     INTERRUPT.arm()
     try:
+        return _run(arguments)
+    finally:
+        INTERRUPT.restore()
+
+
+def _run(arguments: Sequence[str]) -> int:
+    try:
         code = app(list(arguments), prog_name=PROGRAM, standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:
         INTERRUPT.disarm()

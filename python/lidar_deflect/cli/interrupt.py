@@ -16,12 +16,13 @@ class Interrupt:
 
     def __init__(self) -> None:
         self.came = False
+        self._before: Any = None
 
     def arm(self) -> None:
         """Take Ctrl-C from here on."""
         self.came = False
         try:
-            signal.signal(signal.SIGINT, self._raise)
+            self._before = signal.signal(signal.SIGINT, self._raise)
         except ValueError:  # not the main thread: whoever runs us there handles signals
             return
         sys.unraisablehook = self._unraisable
@@ -33,10 +34,14 @@ class Interrupt:
 
     def disarm(self) -> None:
         """Ignore further interrupts: what is left takes no time."""
-        try:
+        if self._before is not None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
-        except ValueError:
-            return
+
+    def restore(self) -> None:
+        """Give Ctrl-C back to whoever had it."""
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+            sys.unraisablehook = sys.__unraisablehook__
 
     def _raise(self, *_: object) -> None:
         self.came = True

@@ -483,3 +483,90 @@ fn too_few_packets_leave_two_models_open() {
             .any(|note| note.contains("too few packets"))
     );
 }
+
+/// Sends numbered packets whose clock, at `from`, runs over the end of an hour, day and year.
+#[test]
+fn clocks_run_over_the_second_the_hour_and_the_year() {
+    // 2024-12-31 23:59:59.95 UTC.
+    const SILVESTER: Timestamp = Timestamp(1_735_689_599_950_000_000);
+    let source: SocketAddr = "192.168.1.201:10000".parse().unwrap();
+    let destination: SocketAddr = "192.168.1.100:2368".parse().unwrap();
+    for writer in writers() {
+        let id = writer.model.id();
+        let mode = writer.modes[0];
+        let period_ns = writer.model.period_ns(mode);
+        let echo = |_, _| RawEcho {
+            range: 2_500,
+            intensity: 9,
+        };
+        let mut scan = Scan::new(ScanOptions::default());
+        let packets = 100_000_000 / period_ns;
+        for number in 0..packets {
+            let mut sent = packet(&writer, mode, number as u32, echo);
+            sent.time = Timestamp((SILVESTER + number * period_ns).0 / 1000 * 1000);
+            let payload = (writer.encode)(&sent);
+            scan.push(&Datagram {
+                time: sent.time + period_ns + 80_000,
+                source,
+                destination,
+                payload: &payload,
+                record: number as u64,
+                offset: 0,
+            });
+        }
+        let report = scan.finish();
+        let info = &report.lidars[0];
+        assert_eq!(
+            (info.counts.packets, info.counts.lost),
+            (packets as u64, 0),
+            "{id}"
+        );
+        assert_eq!(info.clock.segments().len(), 1, "{id}");
+        let off_ns = (info.first - SILVESTER)
+            .abs()
+            .max((info.last - SILVESTER - packets * period_ns).abs());
+        assert!(off_ns < 2_300_000, "{id}: {off_ns} ns off UTC");
+    }
+}
+
+#[test]
+fn a_clock_that_is_set_while_numbers_go_on_begins_a_new_segment() {
+    let writer = writers()
+        .into_iter()
+        .find(|w| w.model.id() == "xt32")
+        .unwrap();
+    let mode = ReturnMode::Dual;
+    let source: SocketAddr = "192.168.1.201:10000".parse().unwrap();
+    let destination: SocketAddr = "192.168.1.100:2368".parse().unwrap();
+    let echo = |_, _| RawEcho {
+        range: 2_500,
+        intensity: 9,
+    };
+    let mut scan = Scan::new(ScanOptions::default());
+    for number in 0..2000_u32 {
+        let mut sent = packet(&writer, mode, number, echo);
+        let arrival = sent.time + 300_000;
+        if number < 1000 {
+            sent.time = sent.time + -200_000_000_000_000; // not yet set by its master
+        }
+        let payload = (writer.encode)(&sent);
+        scan.push(&Datagram {
+            time: arrival,
+            source,
+            destination,
+            payload: &payload,
+            record: number.into(),
+            offset: 0,
+        });
+    }
+    let report = scan.finish();
+    let info = &report.lidars[0];
+    assert_eq!((info.counts.packets, info.counts.lost), (2000, 0));
+    let kinds: Vec<&str> = info
+        .clock
+        .segments()
+        .iter()
+        .map(|segment| segment.kind.name())
+        .collect();
+    assert_eq!(kinds, ["free_running", "utc"]);
+}

@@ -1,7 +1,9 @@
 //! Step 10: the tip as the intersection of both contour curves, projected on a plane.
 
+use thiserror::Error;
+
 use super::curves::ContourCurve;
-use crate::error::InvalidValue;
+use crate::error::{Coded, InvalidValue};
 use crate::fit::Fit;
 use crate::fit::polynomial::Polynomial;
 
@@ -47,11 +49,13 @@ pub struct Tip {
 }
 
 /// Why a frame has no tip: never a number instead.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum NoTip {
     /// The curves do not meet within one visible length beyond the last sample.
+    #[error("the contour curves do not meet within one visible length beyond the last scan line")]
     NoIntersection,
     /// The curves are nearly parallel where they meet.
+    #[error("the contour curves are nearly parallel where they meet: the tip is ill-posed")]
     IllPosed,
 }
 
@@ -62,6 +66,19 @@ impl NoTip {
             NoTip::NoIntersection => "no_intersection",
             NoTip::IllPosed => "ill_posed",
         }
+    }
+}
+
+impl Coded for NoTip {
+    fn code(&self) -> &'static str {
+        match self {
+            NoTip::NoIntersection => "measurement.no_intersection",
+            NoTip::IllPosed => "measurement.ill_posed",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        Some("try the other plane, or other degrees of the curves".into())
     }
 }
 
