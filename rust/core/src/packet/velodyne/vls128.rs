@@ -59,7 +59,7 @@ pub static VLS128: Vls128 = Vls128;
 pub struct Vls128;
 
 impl Vls128 {
-    /// Beams of the manual; delays in slots of [`USUAL_SLOT_NS`].
+    /// Beams of the manual; delays in slots of 2.764 us.
     pub fn beams() -> Beams {
         let beam = |laser: usize| {
             let (elevation_deg, rotation_deg) = TABLE[laser];
