@@ -157,8 +157,8 @@ def test_no_lidar_names_the_closest_stream(tmp_path: Path) -> None:
     assert error.code == "capture.no_lidar"
     assert error.facts[0] == ("read", "376 packets in 1 UDP streams")
     closest = dict(error.facts)["closest"]
-    assert closest.startswith("192.168.1.201 -> port 2368, 1206 bytes, 754/s: the size fits")
-    assert "0x00 0x00" in closest
+    assert closest.startswith("192.168.1.201 -> port 2368, 1206 bytes, 754/s: the bytes fit")
+    assert "HDL-32E, the packet period of 1327 us does not" in closest
     assert error.hint == "name the model: --sensor 192.168.1.201=vlp16"
     named = capture.open(path, sensors={"192.168.1.201": "vlp16"})
     assert named.streams[0].packets == 376

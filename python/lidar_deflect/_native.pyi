@@ -46,6 +46,7 @@ __all__ = [
     "scan_capture",
     "scan_quickly",
     "sensor_models",
+    "sensor_table",
     "walk_arc",
     "yaw_from_wall",
 ]
@@ -66,12 +67,18 @@ def scan_capture(
     paths: Sequence[Path],
     *,
     sensors: Sequence[tuple[str, str]],
+    units: Sequence[tuple[str | None, str, bytes, bool]],
     progress: Callable[[int, int], None] | None = None,
 ) -> CaptureScan: ...
 def scan_quickly(
-    paths: Sequence[Path], *, sensors: Sequence[tuple[str, str]], head_s: float
+    paths: Sequence[Path],
+    *,
+    sensors: Sequence[tuple[str, str]],
+    units: Sequence[tuple[str | None, str, bytes, bool]],
+    head_s: float,
 ) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
 def sensor_models() -> list[tuple[str, str]]: ...
+def sensor_table() -> list[list[str]]: ...
 
 @final
 class CaptureScan:

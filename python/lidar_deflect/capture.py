@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidar_deflect import _native
+from lidar_deflect import _native, units
 from lidar_deflect._native import Sweep, SweepIterator
 from lidar_deflect.errors import InvalidValueError
 from lidar_deflect.streams import StreamInfo, no_lidar, same_address, stream, utc
@@ -67,8 +67,10 @@ class Capture:
         paths: Sequence[Path],
         sensors: Mapping[str, str],
         ids: Mapping[str, str | None],
+        files: Sequence[units.UnitFile] = (),
     ) -> None:
         self.paths = tuple(paths)
+        self._units = tuple(files)
         self._sensors = dict(sensors)
         self._ids = dict(ids)
         self._found: _Found | None = None
@@ -83,7 +85,9 @@ class Capture:
         """
         if self._found is None:
             named = list(self._sensors.items())
-            scan = _native.scan_capture(self.paths, sensors=named, progress=progress)
+            scan = _native.scan_capture(
+                self.paths, sensors=named, units=self._units, progress=progress
+            )
             self._found = self._judge(scan)
 
     def _judge(self, scan: _native.CaptureScan) -> "_Found":
@@ -160,7 +164,9 @@ class Capture:
 
     def _quick_info(self) -> dict[str, Any]:
         named = list(self._sensors.items())
-        scan, ends = _native.scan_quickly(self.paths, sensors=named, head_s=QUICK_HEAD_S)
+        scan, ends = _native.scan_quickly(
+            self.paths, sensors=named, units=self._units, head_s=QUICK_HEAD_S
+        )
         last_ns: dict[str, int] = {}
         for address, end_ns in ends:
             last_ns[address] = max(end_ns, last_ns.get(address, end_ns))
@@ -313,7 +319,9 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     sensors
         Models by source, for sensors that the content does not tell: ``{"10.0.0.5": "vlp16"}``.
     beams
-        Files of single units by source. None of the models that are known takes any yet.
+        Files of single units, a path or several by source, ``""`` for any lidar:
+        ``{"10.0.0.5": ["angle.csv", "firetime.csv"]}``. What they are, their content tells. Files
+        beside a capture that have its name (``tower.pcap``, ``tower.angle.csv``) need not be given.
 
     Returns
     -------
@@ -326,17 +334,16 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     CaptureError
         If a file is no capture.
     InvalidValueError
-        If a model is not known.
+        If a model is not known, or a file of a unit cannot be read (``beams.unreadable``).
+        Later, when the capture is read: if a file is of no lidar of the capture
+        (``beams.not_taken``), is broken (``beams.malformed``), or a model gives no points without
+        one (``beams.missing``).
     """
     paths = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
-    if beams:
-        raise InvalidValueError(
-            f"beams: expected none, found files for {', '.join(name or 'all' for name in beams)}",
-            code="beams.not_needed",
-            hint="the known models have their beams from the factory table: leave --beams out",
-        )
     _native.check_captures(paths)
     lidars = _lidars_of(config)
+    own = {lidar.source or "": files for lidar in lidars if (files := getattr(lidar, "beams", ()))}
+    files = units.named(own | dict(beams or {})) + units.beside(paths)
     ids = {lidar.id: lidar.source for lidar in lidars}
     named = {lidar.source: lidar.model for lidar in lidars if lidar.source}
     named = {source: model for source, model in named.items() if model != "auto"}
@@ -347,7 +354,7 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
                 f"sensor model: expected one of {', '.join(known)}, found {model!r}",
                 code="sensor.unknown",
             )
-    return Capture(paths, named | dict(sensors or {}), ids)
+    return Capture(paths, named | dict(sensors or {}), ids, files)
 
 
 def sensor_models() -> tuple[tuple[str, str], ...]:

@@ -23,8 +23,11 @@ class StreamInfo:
         Address of the sensor, port at the receiver; source port only where the content needs it.
     model, title, candidates
         Id and name of the model, and ids that the content cannot tell from it.
+    beams
+        Where the angles of the unit come from; begins with ``missing`` where there are none.
     return_mode
-        ``strongest``, ``last`` or ``dual``.
+        ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with its two
+        returns in parentheses.
     rpm
         Turns a minute in the mean.
     packets, lost, duplicated, late, too_late, foreign
@@ -55,6 +58,7 @@ class StreamInfo:
     title: str
     candidates: tuple[str, ...]
     named: bool
+    beams: str
     return_mode: str
     rpm: float
     packets: int
@@ -93,7 +97,7 @@ class StreamInfo:
         """Entry of ``streams`` in the document of ``info --json``."""
         shown = (
             *("lidar", "source", "port", "source_port", "model", "title", "candidates"),
-            *("return_mode", "rpm", "packets", "lost", "duplicated", "late", "too_late"),
+            *("beams", "return_mode", "rpm", "packets", "lost", "duplicated", "late", "too_late"),
             *("foreign", "points", "merged", "field_of_view_deg", "clock", "position", "notes"),
         )
         entry = {name: getattr(self, name) for name in shown}
@@ -103,7 +107,6 @@ class StreamInfo:
             "notes": list(self.notes),
             "first_utc": utc(self.first_ns),
             "last_utc": utc(self.last_ns),
-            "beams": "factory table",
         }
 
 

@@ -31,6 +31,90 @@ impl Coded for InvalidValue {
     }
 }
 
+/// A file that should describe a unit and does not, or a unit that cannot be decoded without one.
+#[derive(Debug, Clone, Error, PartialEq, Eq)]
+pub enum UnitError {
+    /// The model means nothing without the calibration of the unit.
+    #[error(
+        "{model}: no points without the calibration of the unit, and neither a file nor the packets give one"
+    )]
+    Missing {
+        /// Name of the model.
+        model: &'static str,
+        /// How to get the calibration.
+        obtain: &'static str,
+    },
+    /// No lidar of the capture can use the file.
+    #[error("{file}: expected a calibration file of {models}, found {found}")]
+    NotTaken {
+        /// Name of the file.
+        file: String,
+        /// Models that were asked.
+        models: String,
+        /// What it looks like.
+        found: String,
+    },
+    /// The file is of the right kind and broken.
+    #[error("{file}{place}: expected {expected}, found {found}")]
+    Malformed {
+        /// Name of the file.
+        file: String,
+        /// Where in it.
+        place: String,
+        /// What a sound file has there.
+        expected: String,
+        /// What was there.
+        found: String,
+    },
+}
+
+impl Coded for UnitError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Missing { .. } => "beams.missing",
+            Self::NotTaken { .. } => "beams.not_taken",
+            Self::Malformed { .. } => "beams.malformed",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Missing { obtain, .. } => Some((*obtain).into()),
+            Self::NotTaken { .. } => {
+                Some("see docs/sensors.md for the files that each model takes".into())
+            }
+            Self::Malformed { .. } => Some("fetch the file from the sensor again".into()),
+        }
+    }
+}
+
+/// Why a lidar of a capture cannot be read.
+#[derive(Debug, Clone, Error, PartialEq)]
+pub enum ReadError {
+    /// There is no such lidar.
+    #[error(transparent)]
+    Value(#[from] InvalidValue),
+    /// Nothing fit to decode it with is known of the unit.
+    #[error(transparent)]
+    Unit(#[from] UnitError),
+}
+
+impl Coded for ReadError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Value(error) => error.code(),
+            Self::Unit(error) => error.code(),
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        match self {
+            Self::Value(error) => error.hint(),
+            Self::Unit(error) => error.hint(),
+        }
+    }
+}
+
 /// Bytes that are not the capture they should be. What stood before them has been read.
 #[derive(Debug, Clone, Error, PartialEq, Eq)]
 pub enum CaptureError {

@@ -68,7 +68,7 @@ fn decode(name: &str) -> (Decoded, Vec<Vec<u8>>) {
             packet,
             mean_rate_rad_per_ns: 0.0,
         };
-        let mut decoder = model.decoder(&model.beams()).unwrap();
+        let mut decoder = model.fit(&[]).unwrap().decoder;
         decoder.decode(datagram.payload, place, &mut decoded);
         packet += 1;
     }

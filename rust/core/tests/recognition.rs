@@ -15,16 +15,23 @@ fn old_firmware_is_told_by_its_packet_period() {
     };
     let report = scan(&old.packets(0.5), ScanOptions::default());
     assert_eq!(report.lidars[0].model.id(), "vlp16");
-    // The same bytes at the pace of an HDL-32E are none.
+    // The same bytes at the pace of an HDL-32E are its own.
     let mut fast = old.packets(0.5);
     for (number, packet) in (0..).zip(&mut fast) {
         let stamp: u32 = 1_000_000 + number * 553;
         packet.payload[1200..1204].copy_from_slice(&stamp.to_le_bytes());
     }
     let report = scan(&fast, ScanOptions::default());
+    assert_eq!(report.lidars[0].model.id(), "hdl32e");
+    // At a pace of neither they are no lidar's.
+    for (number, packet) in (0..).zip(&mut fast) {
+        let stamp: u32 = 1_000_000 + number * 900;
+        packet.payload[1200..1204].copy_from_slice(&stamp.to_le_bytes());
+    }
+    let report = scan(&fast, ScanOptions::default());
     assert!(report.lidars.is_empty());
     let near = report.others[0].closest.clone().unwrap();
-    assert!(near.why.contains("553 us"), "{near:?}");
+    assert!(near.why.contains("900 us"), "{near:?}");
 }
 
 #[test]
@@ -46,6 +53,7 @@ fn a_named_model_overrides_its_factory_bytes() {
             Source::parse("192.168.1.201").unwrap(),
             model("vlp16").unwrap(),
         )],
+        units: Vec::new(),
         split: vec![],
     };
     let report = scan(&sent, options);

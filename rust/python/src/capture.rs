@@ -10,8 +10,8 @@ mod sweeps;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use lidar_deflect_core::packet;
-use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, Source};
+use lidar_deflect_core::packet::{self, unit::UnitFile};
+use lidar_deflect_core::stream::{Given, Scan, ScanOptions, ScanReport, Source};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -62,19 +62,24 @@ impl CaptureScan {
 
 /// Reads a capture once and tells what is in it.
 ///
-/// `sensors` are pairs of a source and a model id; `progress` is called with bytes done and total.
+/// `sensors` are pairs of a source and a model id; `units` are files of single units: source or none,
+/// name, content, and whether the user named it; `progress` is called with bytes done and total.
 #[pyfunction]
-#[pyo3(signature = (paths, *, sensors, progress=None))]
+#[pyo3(signature = (paths, *, sensors, units, progress=None))]
 fn scan_capture(
     py: Python<'_>,
     paths: Vec<PathBuf>,
     sensors: Vec<(String, String)>,
+    units: Vec<UnitEntry>,
     progress: Option<Py<PyAny>>,
 ) -> BorderResult<CaptureScan> {
-    let options = options(&sensors)?;
+    let options = options(&sensors, units)?;
     let (mut report, mut files) = scan_once(py, &paths, options, progress.as_ref())?;
     if let Some(options) = report.split() {
         (report, files) = scan_once(py, &paths, options, progress.as_ref())?;
+    }
+    if !report.lidars.is_empty() {
+        report.check_units()?;
     }
     Ok(CaptureScan {
         paths,
@@ -83,11 +88,21 @@ fn scan_capture(
     })
 }
 
-fn options(sensors: &[(String, String)]) -> BorderResult<ScanOptions> {
+/// Source or none, name, content, and whether the user named the file.
+type UnitEntry = (Option<String>, String, Vec<u8>, bool);
+
+fn options(sensors: &[(String, String)], units: Vec<UnitEntry>) -> BorderResult<ScanOptions> {
     let mut options = ScanOptions::default();
     for (source, id) in sensors {
         let named = (Source::parse(source)?, packet::model(id)?);
         options.models.push(named);
+    }
+    for (source, name, content, is_named) in units {
+        options.units.push(Given {
+            source: source.as_deref().map(Source::parse).transpose()?,
+            file: UnitFile::new(name, content),
+            is_named,
+        });
     }
     Ok(options)
 }
@@ -113,15 +128,16 @@ fn scan_once(
 /// What is counted is of the head; the second value gives the end of the last packet of each lidar
 /// that is seen in the tail, by name, UTC in nanoseconds.
 #[pyfunction]
-#[pyo3(signature = (paths, *, sensors, head_s))]
+#[pyo3(signature = (paths, *, sensors, units, head_s))]
 #[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 fn scan_quickly(
     py: Python<'_>,
     paths: Vec<PathBuf>,
     sensors: Vec<(String, String)>,
+    units: Vec<UnitEntry>,
     head_s: f64,
 ) -> BorderResult<(CaptureScan, Vec<(String, i64)>)> {
-    let options = options(&sensors)?;
+    let options = options(&sensors, units)?;
     let mut feed = Feed::open(py, &paths)?;
     let mut scan = Scan::new(options.clone());
     let mut first = None;
@@ -157,6 +173,20 @@ fn sensor_models() -> Vec<(&'static str, &'static str)> {
     models.map(|model| (model.id(), model.title())).collect()
 }
 
+/// What is decoded of each model and how that was proven: id, name, how it is recognised, returns,
+/// files of a unit, proof.
+#[pyfunction]
+fn sensor_table() -> Vec<[String; 6]> {
+    let rows = packet::proof::ROWS.iter();
+    rows.map(|row| {
+        let title = packet::model(row.id).map_or(row.id, |model| model.title());
+        let texts = [row.id, title, row.recognised, row.returns, row.unit];
+        let [id, title, recognised, returns, unit] = texts.map(str::to_owned);
+        [id, title, recognised, returns, unit, row.proof.describe()]
+    })
+    .collect()
+}
+
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<CaptureScan>()?;
     module.add_class::<sweeps::Sweep>()?;
@@ -166,5 +196,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
+    module.add_function(wrap_pyfunction!(sensor_table, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_models, module)?)
 }

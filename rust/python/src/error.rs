@@ -1,6 +1,8 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
-use lidar_deflect_core::error::{CaptureError, ClusterError, Coded, FitError, InvalidValue};
+use lidar_deflect_core::error::{
+    CaptureError, ClusterError, Coded, FitError, InvalidValue, ReadError, UnitError,
+};
 use lidar_deflect_core::paper::tip::NoTip;
 use lidar_deflect_core::register::wall::WallError;
 use lidar_deflect_files::FileError;
@@ -49,6 +51,8 @@ translate! {
     ClusterError => "InvalidValueError",
     FitError => "MeasurementError",
     InvalidValue => "InvalidValueError",
+    ReadError => "InvalidValueError",
+    UnitError => "InvalidValueError",
     NoTip => "MeasurementError",
     WallError => "CalibrationError",
 }

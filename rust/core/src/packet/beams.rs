@@ -45,6 +45,21 @@ impl Beams {
         }
     }
 
+    /// Checks the number of channels.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] for another number than `count`.
+    pub fn expect(&self, count: usize) -> Result<(), InvalidValue> {
+        if self.channels.len() == count {
+            return Ok(());
+        }
+        Err(InvalidValue {
+            name: "beams",
+            expected: format!("{count} channels"),
+            found: self.channels.len().to_string(),
+        })
+    }
+
     /// Channels in the order within a firing.
     pub fn channels(&self) -> &[Beam] {
         &self.channels

@@ -4,15 +4,20 @@
 //! A new sensor is one value that implements [`Model`] and one line in [`MODELS`]; nothing else in
 //! the library names a model.
 
+pub mod aim;
 pub mod beams;
+pub mod echoes;
+pub mod hesai;
+pub mod proof;
+pub mod unit;
 pub mod velodyne;
 
 use crate::angle::{Arc, wrap_turn};
 use crate::cloud::Return;
 use crate::drops::Drops;
-use crate::error::InvalidValue;
+use crate::error::{InvalidValue, UnitError};
 use crate::time::{NANOS_PER_HOUR, Timestamp};
-use beams::Beams;
+use unit::{Fitted, Gather, UnitFile};
 
 /// A registered sensor model.
 pub type ModelRef = &'static dyn Model;
@@ -22,6 +27,28 @@ pub static MODELS: &[ModelRef] = &[
     &velodyne::puck::VLP16,
     &velodyne::puck::VLP16_HIRES,
     &velodyne::puck::PUCK_LITE,
+    &velodyne::hdl32e::HDL32E,
+    &velodyne::vlp32::VLP32C,
+    &velodyne::vlp32::VLP32A,
+    &velodyne::vls128::VLS128,
+    &velodyne::hdl64e::HDL64E_S3,
+    &velodyne::hdl64e::HDL64E_S2,
+    &hesai::pandar::PANDAR40P,
+    &hesai::pandar::PANDAR40AC,
+    &hesai::pandar::PANDAR64,
+    &hesai::xt::XT16,
+    &hesai::xt::XT32,
+    &hesai::xt::XT32M2X,
+    &hesai::xt::QT64,
+    &hesai::qt128::QT128,
+    &hesai::pandar128::PANDAR128,
+    &hesai::pandar128::PANDAR90,
+    &hesai::pandar128::OT128,
+    &hesai::pandar128::JT128,
+    &hesai::at128::AT128,
+    &hesai::atx::ATX,
+    &hesai::ft120::FT120,
+    &hesai::jt16::JT16,
 ];
 
 /// What the library must know of one sensor model.
@@ -70,14 +97,22 @@ pub trait Model: Sync + std::fmt::Debug {
         }
     }
 
-    /// Beams of a unit whose own calibration is not known.
-    fn beams(&self) -> Beams;
+    /// Whether `file` describes a unit of this model, judged by its content.
+    fn takes(&self, _file: &UnitFile) -> bool {
+        false
+    }
 
-    /// Turns data packets into returns with the beams of one unit.
+    /// Gathers a unit's description from its data packets, where they carry one.
+    fn gather(&self) -> Option<Box<dyn Gather>> {
+        None
+    }
+
+    /// Turns data packets into returns, with what `files` say of the unit; a file that is not taken does
+    /// not matter.
     ///
     /// # Errors
-    /// [`InvalidValue`] where `beams` has another number of channels than the model.
-    fn decoder(&self, beams: &Beams) -> Result<Box<dyn Decoder>, InvalidValue>;
+    /// [`UnitError`] for a file that is taken and broken, or where the model needs one and there is none.
+    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError>;
 }
 
 /// What a datagram of a sensor is for.
@@ -109,8 +144,22 @@ pub enum ReturnMode {
     Strongest,
     /// The last one.
     Last,
+    /// The first one.
+    First,
+    /// The second one.
+    Second,
     /// Last and strongest, or last and second strongest where they are the same.
     Dual,
+    /// First and second.
+    FirstSecond,
+    /// First and last.
+    FirstLast,
+    /// First and strongest.
+    FirstStrongest,
+    /// Strongest and second strongest.
+    StrongestSecond,
+    /// First, strongest and last.
+    Triple,
 }
 
 impl ReturnMode {
@@ -119,7 +168,23 @@ impl ReturnMode {
         match self {
             Self::Strongest => "strongest",
             Self::Last => "last",
+            Self::First => "first",
+            Self::Second => "second",
             Self::Dual => "dual",
+            Self::FirstSecond => "dual (first, second)",
+            Self::FirstLast => "dual (first, last)",
+            Self::FirstStrongest => "dual (first, strongest)",
+            Self::StrongestSecond => "dual (strongest, second)",
+            Self::Triple => "triple",
+        }
+    }
+
+    /// Echoes that a packet has room for in each shot.
+    pub fn returns(self) -> usize {
+        match self {
+            Self::Strongest | Self::Last | Self::First | Self::Second => 1,
+            Self::Triple => 3,
+            _ => 2,
         }
     }
 }
@@ -219,6 +284,15 @@ pub struct Tally {
     pub points: u32,
     /// Second returns that repeat the first and were merged into it.
     pub merged: u32,
+}
+
+impl Tally {
+    /// Counts the two ranges of one shot.
+    pub fn add_pair(&mut self, one: u16, other: u16) {
+        let is_merged = one == other && one != 0;
+        self.points += u32::from(one != 0) + u32::from(other != 0) - u32::from(is_merged);
+        self.merged += u32::from(is_merged);
+    }
 }
 
 /// What speaks against a packet that nobody claims.

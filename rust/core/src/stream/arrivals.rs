@@ -1,7 +1,7 @@
 //! The data packets of one lidar as they arrive: unrolled in time, put in order, gaps measured.
 
 use super::report::Pause;
-use crate::angle::Arc;
+use crate::angle::{Arc, wrap_half_turn};
 use crate::clock::Unroller;
 use crate::loss::order::{Order, Passed, Stamp, Strays, Verdict};
 use crate::loss::view::FieldOfView;
@@ -44,6 +44,8 @@ pub struct Gap {
     pub period_ns: i64,
     /// What they would have seen.
     pub arc: Arc,
+    /// Sequence numbers tell that they were sent.
+    pub is_numbered: bool,
     /// Host time around them.
     pub arrivals: (Timestamp, Timestamp),
 }
@@ -56,6 +58,9 @@ impl Gap {
         let is_pause = |pause: &Pause| pause.from >= before && pause.to <= after;
         if pauses.iter().rev().any(is_pause) {
             return 0;
+        }
+        if self.is_numbered {
+            return self.lost;
         }
         (self.lost as f64 * view.visible_share(self.arc)).round() as u64
     }
@@ -88,10 +93,17 @@ pub struct Arrivals<T> {
 /// Where the last passed packet ended.
 #[derive(Debug, Clone, Copy)]
 struct Last {
+    start: Timestamp,
+    start_rad: f64,
     end: Timestamp,
     azimuth_rad: f64,
     arrival: Timestamp,
 }
+
+/// A packet within so many durations of another tells the rate of the rotor.
+const NEIGHBOUR: i64 = 8;
+/// Numbered packets whose clock goes off the host's by more than this have had it set; 0.5 s.
+const CLOCK_SET_NS: i64 = 500_000_000;
 
 impl<T> Arrivals<T> {
     pub fn new(model: ModelRef) -> Self {
@@ -125,10 +137,11 @@ impl<T> Arrivals<T> {
             packet: self.packets,
             mean_rate_rad_per_ns: self.mean_rate_rad_per_ns,
         };
+        let ticket = self.complete(ticket);
         self.packets = self.packets.wrapping_add(1);
         let stamp = self.stamp(&ticket, mark);
         let period_ns = self.model.period_ns(head.return_mode).max(1);
-        let step = if self.sequence.is_some() {
+        let step = if self.sequence.is_some() && head.sequence.is_some() {
             1
         } else {
             period_ns
@@ -179,6 +192,32 @@ impl<T> Arrivals<T> {
             .map_or_else(Strays::default, Order::take_strays)
     }
 
+    /// Whether the device clock was set while the sequence number went on.
+    fn is_clock_set(&self, ticket: &Ticket) -> bool {
+        self.last
+            .filter(|_| ticket.head.sequence.is_some())
+            .is_some_and(|last| {
+                let device_ns = ticket.device - last.start;
+                let host_ns = ticket.arrival - last.arrival;
+                device_ns.saturating_sub(host_ns).saturating_abs() > CLOCK_SET_NS
+            })
+    }
+
+    /// Tells how fast the rotor turns from the packet before, where one packet alone cannot.
+    fn complete(&self, mut ticket: Ticket) -> Ticket {
+        let head = &mut ticket.head;
+        let Some(last) = self.last.filter(|_| head.rate_rad_per_ns == 0.0) else {
+            return ticket;
+        };
+        let elapsed_ns = ticket.device - last.start;
+        let turned_rad = wrap_half_turn(head.azimuth_rad - last.start_rad);
+        if turned_rad > 0.0 && (1..NEIGHBOUR * head.duration_ns.max(1)).contains(&elapsed_ns) {
+            head.rate_rad_per_ns = turned_rad / elapsed_ns as f64;
+            head.turned_rad = head.rate_rad_per_ns * head.duration_ns as f64;
+        }
+        ticket
+    }
+
     /// Mean rotation rate over the last hundred packets or so.
     fn follow_rate(&mut self, head: &Head) -> f64 {
         if head.left_out.is_none() && head.rate_rad_per_ns > 0.0 {
@@ -214,6 +253,7 @@ impl<T> Arrivals<T> {
     }
 
     fn pass(&mut self, ticket: Ticket, lost: u64, is_late: bool, is_jump: bool) -> Ordered {
+        let is_jump = is_jump || self.is_clock_set(&ticket);
         self.segment += usize::from(is_jump);
         self.clock.follow(ticket.arrival, ticket.device);
         let gap = self.last.filter(|_| lost > 0).map(|last| {
@@ -226,10 +266,13 @@ impl<T> Arrivals<T> {
                     from_rad: last.azimuth_rad,
                     width_rad: missing_ns as f64 * ticket.head.rate_rad_per_ns.max(0.0),
                 },
+                is_numbered: ticket.head.sequence.is_some(),
                 arrivals: (last.arrival, ticket.arrival),
             }
         });
         self.last = Some(Last {
+            start: ticket.device,
+            start_rad: ticket.head.azimuth_rad,
             end: ticket.device + ticket.head.duration_ns,
             azimuth_rad: ticket.head.next_azimuth_rad(),
             arrival: ticket.arrival,

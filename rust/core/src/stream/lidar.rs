@@ -2,11 +2,13 @@
 
 use super::StreamKey;
 use super::arrivals::{Arrival, Arrivals, Gap, Ordered, Ticket, mark};
+use super::probe::Choice;
 use super::report::{Pause, PositionFacts, Second, StreamInfo};
 use crate::clock::ClockEstimator;
 use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
+use crate::packet::unit::{Calibration, Gather, UnitFile};
 use crate::packet::{ModelRef, PacketKind, Tally};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 
@@ -30,6 +32,8 @@ pub struct Shared {
 pub struct Lidar {
     model: ModelRef,
     is_named: bool,
+    candidates: Vec<&'static str>,
+    gather: Option<Box<dyn Gather>>,
     arrivals: Arrivals<Tally>,
     clock: ClockEstimator,
     view: FieldOfView,
@@ -48,10 +52,13 @@ pub struct Lidar {
 }
 
 impl Lidar {
-    pub fn new(model: ModelRef, is_named: bool) -> Self {
+    pub fn new(choice: Choice, is_named: bool) -> Self {
+        let model = choice.model;
         Self {
             model,
             is_named,
+            candidates: choice.candidates,
+            gather: model.gather(),
             arrivals: Arrivals::new(model),
             clock: ClockEstimator::default(),
             view: FieldOfView::default(),
@@ -78,6 +85,11 @@ impl Lidar {
         }
     }
 
+    /// What the data packets tell of the unit.
+    pub fn gathered(&self) -> Option<UnitFile> {
+        self.gather.as_ref()?.file()
+    }
+
     pub fn count_port(&mut self, port: u16) {
         let ports = &mut self.source_ports;
         let place = ports.iter().position(|(known, _)| *known == port);
@@ -93,6 +105,9 @@ impl Lidar {
             self.broken += 1;
             return;
         };
+        if let Some(gather) = &mut self.gather {
+            gather.take(payload);
+        }
         let tally = self.model.tally(payload);
         let (ticket, what) = self.arrivals.offer(arrival, &head, mark(payload), || tally);
         match what {
@@ -234,6 +249,9 @@ impl Lidar {
             key,
             model: self.model,
             is_named: self.is_named,
+            candidates: self.candidates.clone(),
+            unit: Vec::new(),
+            calibration: Ok(Calibration::Factory),
             return_mode: last.ticket.head.return_mode.name(),
             rpm: self.turned_rad / std::f64::consts::TAU / minutes.max(f64::MIN_POSITIVE),
             counts: self.counts,
@@ -285,6 +303,12 @@ impl Lidar {
             let (packets, port, pps) = (facts.packets, facts.port, facts.pps.name());
             notes.push(format!(
                 "{packets} position packets to port {port}, pulse per second {pps}, {sentence}"
+            ));
+        }
+        if self.candidates.len() > self.model.candidates().len() {
+            let (model, others) = (self.model.id(), self.candidates.join(", "));
+            notes.push(format!(
+                "too few packets to tell {model} from {others}: name the model with --sensor"
             ));
         }
         let jumps = info.clock.segments().len().saturating_sub(1);

@@ -18,6 +18,7 @@ use std::net::{IpAddr, SocketAddr};
 use crate::capture::Datagram;
 use crate::error::InvalidValue;
 use crate::packet::ModelRef;
+use crate::packet::unit::UnitFile;
 
 pub use cut::CaptureCut;
 pub use points::{PointBlock, PointReader, PointTagger};
@@ -89,11 +90,30 @@ impl Source {
     }
 }
 
+/// A file of a unit.
+#[derive(Debug, Clone)]
+pub struct Given {
+    /// Whose it is; `None`: of any lidar that takes it.
+    pub source: Option<Source>,
+    /// It.
+    pub file: UnitFile,
+    /// The user named it, so that it has to be of use.
+    pub is_named: bool,
+}
+
+impl Given {
+    fn is_for(&self, key: &StreamKey) -> bool {
+        self.source.is_none_or(|source| source.matches(key))
+    }
+}
+
 /// What the user told beforehand, and what an earlier scan found out.
 #[derive(Debug, Clone, Default)]
 pub struct ScanOptions {
     /// Models by source, which then need only the right size of packets.
     pub models: Vec<(Source, ModelRef)>,
+    /// Files of single units, those that count most first.
+    pub units: Vec<Given>,
     /// Streams that the source port splits.
     pub split: Vec<(IpAddr, u16)>,
 }
@@ -109,6 +129,12 @@ impl ScanOptions {
             port,
             source_port: is_split.then(|| datagram.source.port()),
         }
+    }
+
+    /// The files that may describe the unit of a stream.
+    pub fn unit_files(&self, key: &StreamKey) -> Vec<UnitFile> {
+        let files = self.units.iter().filter(|given| given.is_for(key));
+        files.map(|given| given.file.clone()).collect()
     }
 
     /// The model that the user named for a stream.

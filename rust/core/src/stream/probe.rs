@@ -1,13 +1,38 @@
 //! Which model a stream's packets are of: by their identifying bytes, and by the packet period where
 //! those are not believed.
 
-use crate::packet::{Head, ModelRef, claimants};
+use crate::packet::{Head, MODELS, Misfit, ModelRef, PacketKind, claimants};
 use crate::time::Timestamp;
 
 /// Packets after which a stream is decided.
 const ENOUGH: usize = 32;
 /// The packet period of the data may differ from the model's by this share.
 const PERIOD_TOLERANCE: f64 = 0.25;
+
+/// What a stream is.
+#[derive(Debug, Clone)]
+pub struct Choice {
+    /// The likeliest model.
+    pub model: ModelRef,
+    /// Ids of the others that it may be as well.
+    pub candidates: Vec<&'static str>,
+}
+
+impl Choice {
+    fn one(model: ModelRef) -> Self {
+        let candidates = model.candidates().to_vec();
+        Self { model, candidates }
+    }
+
+    fn among(models: &[ModelRef]) -> Option<Self> {
+        let (model, others) = models.split_first()?;
+        let mut choice = Self::one(*model);
+        choice
+            .candidates
+            .extend(others.iter().map(|other| other.id()));
+        Some(choice)
+    }
+}
 
 /// Data packets of a stream that is not decided yet.
 #[derive(Debug, Default)]
@@ -48,25 +73,64 @@ impl Probe {
     }
 
     /// The model; `None` where no packet came or none of the models fits.
-    pub fn decide(&self) -> Option<ModelRef> {
-        if self.packets.is_empty() || self.named.is_some() {
-            return self.named.filter(|_| !self.packets.is_empty());
+    ///
+    /// A model whose bytes are not believed has to have the packet period of the data, and of several
+    /// that do the nearest is taken. Where there are too few packets to tell, all are candidates.
+    pub fn decide(&self) -> Option<Choice> {
+        self.packets.first()?;
+        if let Some(model) = self.named {
+            return Some(Choice::one(model));
         }
-        let (_, first) = self.packets.first()?;
-        claimants(first).find(|model| {
-            let is_sure = self.packets.iter().all(|(_, p)| model.is_sure(p));
-            is_sure || self.has_period_of(*model)
-        })
+        let claimants = self.claimants();
+        let is_sure = |model: &&ModelRef| self.own(**model).all(|payload| model.is_sure(payload));
+        if let Some(model) = claimants.iter().find(is_sure) {
+            return Some(Choice::one(*model));
+        }
+        let errors: Vec<Option<f64>> = claimants.iter().map(|m| self.period_error(*m)).collect();
+        if errors.iter().all(Option::is_none) {
+            return Choice::among(&claimants);
+        }
+        let known = claimants
+            .iter()
+            .zip(&errors)
+            .filter_map(|(model, error)| Some((*model, (*error)?)));
+        let fitting = known.filter(|(_, error)| *error < PERIOD_TOLERANCE);
+        let nearest = fitting.min_by(|(_, one), (_, other)| one.total_cmp(other));
+        nearest.map(|(model, _)| Choice::one(model))
     }
 
-    /// Why nothing was decided although packets were claimed.
-    pub fn doubt(&self) -> Option<String> {
-        let (_, first) = self.packets.first()?;
-        let model = claimants(first).next()?;
+    /// Models that claim the most of the packets: a stray one does not count.
+    fn claimants(&self) -> Vec<ModelRef> {
+        let count = |model: &ModelRef| self.own(*model).count();
+        let most = MODELS.iter().map(count).max().unwrap_or(0).max(1);
+        let likely = MODELS.iter().filter(|model| count(model) == most);
+        likely.copied().collect()
+    }
+
+    /// Data packets of a model.
+    fn own(&self, model: ModelRef) -> impl Iterator<Item = &[u8]> {
+        let payloads = self.packets.iter().map(|(_, payload)| payload.as_slice());
+        payloads.filter(move |payload| model.recognise(payload) == Some(PacketKind::Data))
+    }
+
+    /// Why nothing was decided although packets were claimed, and the model of their size whose packet
+    /// period they have.
+    pub fn doubt(&self) -> Option<Misfit> {
+        let model = self.claimants().into_iter().next()?;
         let found_us = self.period_ns(model)? / 1000.0;
         let title = model.title();
         let why = format!("the bytes fit {title}, the packet period of {found_us:.0} us does not");
-        Some(why)
+        let fitting = MODELS.iter().copied().filter(|model| {
+            let mut payloads = self.packets.iter().map(|(_, payload)| payload);
+            payloads.all(|payload| model.fits(payload))
+        });
+        let errors = fitting.filter_map(|model| Some((model, self.period_error(model)?)));
+        let near = errors.filter(|(_, error)| *error < PERIOD_TOLERANCE);
+        let nearest = near.min_by(|(_, one), (_, other)| one.total_cmp(other));
+        Some(Misfit {
+            why,
+            may_be: nearest.map(|(model, _)| model.id()),
+        })
     }
 
     /// The packets taken so far, in the order of arrival.
@@ -74,22 +138,19 @@ impl Probe {
         self.packets
     }
 
-    fn has_period_of(&self, model: ModelRef) -> bool {
-        let head = self.packets.iter().find_map(|(_, p)| model.head(p));
-        let (Some(found_ns), Some(head)) = (self.period_ns(model), head) else {
-            return true; // too few packets to tell
-        };
+    /// How far the packet period of the data is off the model's, as a share; `None` where there are too
+    /// few packets to tell.
+    fn period_error(&self, model: ModelRef) -> Option<f64> {
+        let mut payloads = self.packets.iter().map(|(_, payload)| payload);
+        let head = payloads.find_map(|payload| model.head(payload))?;
         let period_ns = model.period_ns(head.return_mode) as f64;
-        (found_ns / period_ns - 1.0).abs() < PERIOD_TOLERANCE
+        Some((self.period_ns(model)? / period_ns - 1.0).abs())
     }
 
     /// Median step of device time; `None` for fewer than three steps.
     fn period_ns(&self, model: ModelRef) -> Option<f64> {
-        let heads: Vec<Head> = self
-            .packets
-            .iter()
-            .filter_map(|(_, p)| model.head(p))
-            .collect();
+        let payloads = self.packets.iter().map(|(_, payload)| payload);
+        let heads: Vec<Head> = payloads.filter_map(|payload| model.head(payload)).collect();
         let steps = heads
             .windows(2)
             .map(|pair| pair[1].device_ns - pair[0].device_ns);

@@ -9,10 +9,9 @@ use crate::capture::Datagram;
 use crate::clock::ClockModel;
 use crate::cloud::PointCloud;
 use crate::drops::Drops;
-use crate::error::InvalidValue;
+use crate::error::{InvalidValue, ReadError, UnitError};
 use crate::frame::Sensor;
 use crate::loss::view::FieldOfView;
-use crate::packet::beams::Beams;
 use crate::packet::{Decoded, Decoder, ModelRef, PacketKind, Place};
 use crate::sweep::{Placed, Sweep, SweepCutter};
 use crate::time::Timestamp;
@@ -24,8 +23,6 @@ pub struct SweepOptions {
     pub lidars: Option<Vec<usize>>,
     /// Azimuths at which sweeps are cut, by number of the lidar; 0 where there is none.
     pub cut_azimuth_rad: Vec<f64>,
-    /// Beams of single units, by number of the lidar.
-    pub beams: Vec<(usize, Beams)>,
     /// Packets before this are left out.
     pub start: Option<Timestamp>,
     /// Packets from this on are left out.
@@ -86,8 +83,9 @@ impl<S: Sink> Reader<S> {
     /// Prepares for the capture that `report` was made of.
     ///
     /// # Errors
-    /// [`InvalidValue`] for a lidar that the report does not have, or beams that do not fit its model.
-    pub fn new(report: &ScanReport, options: &SweepOptions) -> Result<Self, InvalidValue> {
+    /// [`ReadError`] for a lidar that the report does not have, or one that cannot be decoded with what
+    /// is known of its unit.
+    pub fn new(report: &ScanReport, options: &SweepOptions) -> Result<Self, ReadError> {
         let all: Vec<usize> = (0..report.lidars.len()).collect();
         let mut lanes = HashMap::new();
         for number in options.lidars.as_ref().unwrap_or(&all) {
@@ -169,9 +167,7 @@ struct Step<'a, Out> {
 }
 
 impl<S: Sink> Lane<S> {
-    fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, InvalidValue> {
-        let own = options.beams.iter().find(|(lidar, _)| *lidar == number);
-        let beams = own.map_or_else(|| info.model.beams(), |(_, beams)| beams.clone());
+    fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, UnitError> {
         let cut_rad = options.cut_azimuth_rad.get(number).copied().unwrap_or(0.0);
         let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
         Ok(Self {
@@ -179,7 +175,7 @@ impl<S: Sink> Lane<S> {
             model: info.model,
             is_named: info.is_named,
             arrivals: Arrivals::new(info.model),
-            decoder: info.model.decoder(&beams)?,
+            decoder: info.model.fit(&info.unit)?.decoder,
             clock: info.clock.clone(),
             view: info.view.clone(),
             sink: S::new(number, cut_rad, visible_rad),

@@ -5,8 +5,10 @@ use std::net::IpAddr;
 use super::{ScanOptions, StreamKey};
 use crate::clock::ClockModel;
 use crate::drops::Drops;
+use crate::error::UnitError;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
+use crate::packet::unit::{Calibration, UnitFile};
 use crate::packet::velodyne::position::Pps;
 use crate::packet::{Misfit, ModelRef};
 use crate::time::Timestamp;
@@ -20,6 +22,12 @@ pub struct StreamInfo {
     pub model: ModelRef,
     /// Whether the user said so.
     pub is_named: bool,
+    /// Ids of models that the packets cannot tell from this one.
+    pub candidates: Vec<&'static str>,
+    /// What is known of the unit: files that were given, else what its packets say.
+    pub unit: Vec<UnitFile>,
+    /// Where its angles come from, or why there are none.
+    pub calibration: Result<Calibration, UnitError>,
     /// Word for its return mode.
     pub return_mode: &'static str,
     /// Turns a minute, in the mean.
@@ -164,6 +172,29 @@ impl ScanReport {
             options.split.extend(places);
             options
         })
+    }
+
+    /// Whether each file that the user named is of use to a lidar.
+    ///
+    /// # Errors
+    /// [`UnitError`] for the first one that is not.
+    pub fn check_units(&self) -> Result<(), UnitError> {
+        let named = self.options.units.iter().filter(|given| given.is_named);
+        for given in named {
+            let lidars = || self.lidars.iter().filter(|lidar| given.is_for(&lidar.key));
+            if !lidars().any(|lidar| lidar.model.takes(&given.file)) {
+                let mut models: Vec<&str> = lidars().map(|lidar| lidar.model.title()).collect();
+                if models.is_empty() {
+                    models.push("a lidar that is in the capture");
+                }
+                return Err(UnitError::NotTaken {
+                    file: given.file.name.clone(),
+                    models: models.join(", "),
+                    found: given.file.first_line(),
+                });
+            }
+        }
+        Ok(())
     }
 
     /// Counts of every second from the first packet on, by second and lidar.

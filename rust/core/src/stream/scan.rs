@@ -8,6 +8,7 @@ use super::report::{OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
 use super::{ScanOptions, StreamKey};
 use crate::capture::Datagram;
 use crate::drops::Drops;
+use crate::packet::unit::UnitFile;
 use crate::packet::velodyne::position::{Position, Pps};
 use crate::packet::{Misfit, ModelRef, PacketKind, closest, companion};
 use crate::time::{NANOS_PER_SECOND, Timestamp};
@@ -42,6 +43,8 @@ struct Stream {
     payload_len: usize,
     closest: Option<Misfit>,
     position: Option<PositionFacts>,
+    /// The last packet that describes a unit.
+    metadata: Option<UnitFile>,
 }
 
 #[derive(Debug)]
@@ -114,7 +117,8 @@ impl Scan {
                     drops.add("foreign", stream.foreign);
                     lidar.add_drops(&mut drops);
                     let position = self.position_of(key);
-                    lidars.extend(lidar.describe(*key, stream.foreign, position));
+                    let info = lidar.describe(*key, stream.foreign, position);
+                    lidars.extend(info.map(|info| self.with_unit(info, lidar)));
                 }
             }
         }
@@ -133,6 +137,19 @@ impl Scan {
             pauses: self.shared.pauses,
             options: self.options,
         }
+    }
+
+    /// Adds what is known of the unit: the user's files, else what its own packets say.
+    fn with_unit(&self, mut info: StreamInfo, lidar: &Lidar) -> StreamInfo {
+        let mut files = self.options.unit_files(&info.key);
+        let streams = self.streams.iter();
+        let same = streams.filter(|(other, _)| other.address == info.key.address);
+        files.extend(same.filter_map(|(_, stream)| stream.metadata.clone()));
+        files.extend(lidar.gathered());
+        files.retain(|file| info.model.takes(file));
+        info.calibration = info.model.fit(&files).map(|fitted| fitted.calibration);
+        info.unit = files;
+        info
     }
 
     /// Position packets from a lidar's address, to whatever port.
@@ -158,6 +175,7 @@ impl Stream {
             payload_len: datagram.payload.len(),
             closest: None,
             position: None,
+            metadata: None,
         }
     }
 
@@ -170,7 +188,7 @@ impl Stream {
                 if lidar.is_data(payload) {
                     lidar.count_port(datagram.source.port());
                     lidar.push(datagram.time, payload, shared);
-                } else if !self.take_position(datagram) {
+                } else if !self.take_companion(datagram) {
                     self.foreign += 1;
                     self.note_foreign(datagram.time, shared);
                 }
@@ -180,7 +198,7 @@ impl Stream {
                     if probe.is_enough() {
                         self.decide(shared);
                     }
-                } else if !self.take_position(datagram) {
+                } else if !self.take_companion(datagram) {
                     self.foreign += 1;
                     if self.early_foreign.len() < MAX_EARLY {
                         self.early_foreign.push(datagram.time);
@@ -193,10 +211,21 @@ impl Stream {
         }
     }
 
-    fn take_position(&mut self, datagram: &Datagram<'_>) -> bool {
-        if companion(datagram.payload) != Some(PacketKind::Position) {
-            return false;
+    /// Takes what is not data and yet of a lidar.
+    fn take_companion(&mut self, datagram: &Datagram<'_>) -> bool {
+        match companion(datagram.payload) {
+            Some(PacketKind::Position) => self.take_position(datagram),
+            Some(PacketKind::Metadata) => {
+                let name = format!("packets to port {}", datagram.destination.port());
+                self.metadata = Some(UnitFile::new(name, datagram.payload));
+                true
+            }
+            Some(PacketKind::Inertial) => true,
+            _ => false,
         }
+    }
+
+    fn take_position(&mut self, datagram: &Datagram<'_>) -> bool {
         let Some(position) = Position::new(datagram.payload) else {
             return false;
         };
@@ -225,10 +254,10 @@ impl Stream {
         let State::Probing(probe) = &mut self.state else {
             return;
         };
-        let Some(model) = probe.decide() else { return };
+        let Some(choice) = probe.decide() else { return };
         let is_named = probe.is_named();
         let probe = std::mem::take(probe);
-        let mut lidar = Box::new(Lidar::new(model, is_named));
+        let mut lidar = Box::new(Lidar::new(choice, is_named));
         for (arrival, payload) in probe.into_packets() {
             if lidar.is_data(&payload) {
                 lidar.push(arrival, &payload, shared);
@@ -247,8 +276,8 @@ impl Stream {
         match &mut self.state {
             State::Lidar(lidar) => lidar.finish(shared),
             State::Probing(probe) => {
-                if let Some(why) = probe.doubt() {
-                    self.closest = Some(Misfit { why, may_be: None });
+                if let Some(misfit) = probe.doubt() {
+                    self.closest = Some(misfit);
                 }
             }
         }

@@ -2,6 +2,7 @@
 
 use lidar_deflect_core::clock::ClockModel;
 use lidar_deflect_core::drops::Drops;
+use lidar_deflect_core::error::{Coded, UnitError};
 use lidar_deflect_core::stream::{OtherStream, PositionFacts, ScanReport, StreamInfo};
 use lidar_deflect_files::FileFacts;
 use pyo3::prelude::*;
@@ -57,7 +58,12 @@ fn stream<'py>(py: Python<'py>, info: &StreamInfo) -> Dict<'py> {
     dict.set_item("lidar", info.key.to_string())?;
     dict.set_item("model", info.model.id())?;
     dict.set_item("title", info.model.title())?;
-    dict.set_item("candidates", info.model.candidates().to_vec())?;
+    dict.set_item("candidates", info.candidates.clone())?;
+    let beams = match &info.calibration {
+        Ok(calibration) => calibration.describe(),
+        Err(error) => beams_error(error),
+    };
+    dict.set_item("beams", beams)?;
     dict.set_item("named", info.is_named)?;
     dict.set_item("return_mode", info.return_mode)?;
     dict.set_item("rpm", info.rpm)?;
@@ -86,6 +92,13 @@ fn stream<'py>(py: Python<'py>, info: &StreamInfo) -> Dict<'py> {
     dict.set_item("conflict", info.conflict.clone())?;
     dict.set_item("notes", info.notes.clone())?;
     Ok(dict)
+}
+
+fn beams_error(error: &UnitError) -> String {
+    match error.hint() {
+        Some(hint) => format!("missing: {error}; {hint}"),
+        None => format!("missing: {error}"),
+    }
 }
 
 fn clock<'py>(py: Python<'py>, model: &ClockModel) -> Dict<'py> {

@@ -123,7 +123,6 @@ impl SweepIterator {
         let options = SweepOptions {
             lidars: Some(lidars),
             cut_azimuth_rad: cut_rad,
-            beams: Vec::new(),
             start: start_ns.map(Timestamp),
             stop: stop_ns.map(Timestamp),
         };

@@ -63,7 +63,6 @@ impl FramePlan {
                 cut_azimuth_rad: cuts(&lidars, &cut_azimuth_deg),
                 start: Some(Timestamp(start_ns)),
                 stop: Some(Timestamp(stop_ns)),
-                ..SweepOptions::default()
             },
             poses: poses.iter().map(pose).collect::<Result<_, _>>()?,
             lidars,

@@ -1,11 +1,18 @@
 //! Velodyne: one data packet of 1206 bytes for all models, little endian.
 //!
-//! Source: the manuals of VLP-16 (63-9243) and HDL-32E (63-9113).
+//! Source: the manuals of VLP-16 (63-9243), HDL-32E (63-9113), VLP-32C (63-9325) and VLS-128 (63-9480).
 
+mod calibration;
+pub mod hdl32e;
+pub mod hdl64e;
 pub mod position;
 pub mod puck;
 mod rotation;
+mod rows;
+pub mod vlp32;
+pub mod vls128;
 
+use crate::packet::echoes::RawEcho;
 use crate::packet::{Misfit, ReturnMode};
 
 /// Bytes of a data packet.
@@ -22,7 +29,7 @@ mod field {
     use std::ops::Range;
 
     pub const BLOCK_LEN: usize = 100;
-    pub const FLAG: Range<usize> = 0..2; // in a block: FF EE for lasers 0 to 31
+    pub const FLAG: Range<usize> = 0..2; // in a block: FF EE for lasers 0 to 31, FF DD, FF CC, FF BB
     pub const AZIMUTH: Range<usize> = 2..4; // in a block: u16, 0.01 deg
     pub const RETURNS: Range<usize> = 4..100; // in a block: 32 x (u16 range, u8 intensity)
     pub const RETURN_LEN: usize = 3;
@@ -31,21 +38,20 @@ mod field {
     pub const PRODUCT: usize = 1205;
 }
 
-/// Flag of the blocks that carry lasers 0 to 31.
-pub const FLAG_LOWER: [u8; 2] = [0xFF, 0xEE];
+/// First byte of the flags of all blocks; the second tells the bank of lasers.
+const FLAG_FIRST: u8 = 0xFF;
+/// Second bytes of the flags of lasers 0 to 31, 32 to 63, 64 to 95 and 96 to 127.
+const FLAG_BANKS: [u8; 4] = [0xEE, 0xDD, 0xCC, 0xBB];
 
-/// One echo as it is stored.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct RawReturn {
-    /// Range in the model's unit; 0 = no return.
-    pub range: u16,
-    /// 0 to 100 diffuse, 101 to 255 retroreflecting.
-    pub intensity: u8,
-}
+/// One echo as it is stored: range in the model's unit; brightness 0 to 100 diffuse, 101 to 255
+/// retroreflecting.
+pub type RawReturn = RawEcho;
 
 /// One block as it is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RawBlock {
+    /// Bank of 32 lasers: 0 for lasers 0 to 31.
+    pub bank: u8,
     /// Encoder azimuth at the first shot, 0.01 degree.
     pub azimuth_centideg: u16,
     /// Echoes by channel.
@@ -69,7 +75,20 @@ impl<'a> Packet<'a> {
 
     /// Whether a block carries lasers 0 to 31.
     pub fn is_lower(&self, block: usize) -> bool {
-        self.block(block)[field::FLAG] == FLAG_LOWER
+        self.bank(block) == Some(0)
+    }
+
+    /// The bank of 32 lasers that a block carries; `None` where its flag is none.
+    pub fn bank(&self, block: usize) -> Option<usize> {
+        let flag = &self.block(block)[field::FLAG];
+        let bank = FLAG_BANKS.iter().position(|second| *second == flag[1]);
+        bank.filter(|_| flag[0] == FLAG_FIRST)
+    }
+
+    /// Whether the blocks carry these banks, in turn.
+    pub fn has_banks(&self, banks: &[usize]) -> bool {
+        let mut expected = banks.iter().cycle();
+        (0..BLOCKS).all(|block| self.bank(block) == expected.next().copied())
     }
 
     /// Azimuth of a block, 0.01 degree; 36000 and above are not valid.
@@ -163,16 +182,17 @@ pub fn encode(
     }
     bytes[field::TIMESTAMP].copy_from_slice(&timestamp_us.to_le_bytes());
     bytes[field::RETURN_MODE] = match mode {
-        ReturnMode::Strongest => 0x37,
         ReturnMode::Last => 0x38,
         ReturnMode::Dual => 0x39,
+        _ => 0x37,
     };
     bytes[field::PRODUCT] = product;
     bytes
 }
 
 fn encode_block(block: &RawBlock, room: &mut [u8]) {
-    room[field::FLAG].copy_from_slice(&FLAG_LOWER);
+    let second = FLAG_BANKS[usize::from(block.bank) % FLAG_BANKS.len()];
+    room[field::FLAG].copy_from_slice(&[FLAG_FIRST, second]);
     room[field::AZIMUTH].copy_from_slice(&block.azimuth_centideg.to_le_bytes());
     let places = room[field::RETURNS].chunks_exact_mut(field::RETURN_LEN);
     for (place, echo) in places.zip(&block.returns) {

@@ -1,0 +1,123 @@
+//! QT128C2X (protocol 3.2): two loops of lasers take turns.
+//!
+//! Source: its manual and the maker's development kit.
+
+use std::sync::LazyLock;
+
+use super::layout::{HEADER_LEN, Header, Layout, Tail, View, flag};
+use super::rotating::{Family, Rotating};
+use super::unit::Unit;
+use crate::packet::ReturnMode;
+
+const CHANNELS: usize = 128;
+const BLOCKS: usize = 2;
+/// Time of the first firing after the packet's, and from one to the next.
+const FIRST_NS: i64 = 9_000;
+const FIRING_NS: i64 = 111_110;
+/// Checksums of body and tail.
+const CRC_LEN: usize = 4;
+const SAFETY_LEN: usize = 17;
+const SIGNATURE_LEN: usize = 32;
+/// Tail without and with the sequence number.
+const TAIL_LEN: usize = 26;
+const SEQUENCE_LEN: usize = 4;
+
+const TAIL: Tail = Tail {
+    azimuth_state: None,
+    operation: Some(5),
+    return_mode: 12,
+    speed: 13,
+    speed_rpm: 1.0,
+    date: Some(15),
+    micros: 21,
+    sequence: 26,
+    sequence_len: 4,
+};
+
+static UNIT: LazyLock<Unit> =
+    LazyLock::new(|| Unit::built_in("qt128", include_str!("tables/qt128.csv")));
+
+/// QT128C2X.
+pub static QT128: Rotating<Qt128> = Rotating(Qt128);
+
+/// The model.
+#[derive(Debug, Clone, Copy)]
+pub struct Qt128;
+
+/// Layout of a packet with this header.
+fn layout(header: &Header) -> Layout {
+    let option = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
+    let echo_len = header.echo_len();
+    let block_len = 2 + echo_len * CHANNELS;
+    let tail = HEADER_LEN + BLOCKS * block_len + CRC_LEN + option(flag::SAFETY, SAFETY_LEN);
+    let end = tail + TAIL_LEN + option(flag::SEQUENCE, SEQUENCE_LEN) + CRC_LEN;
+    Layout {
+        blocks: BLOCKS,
+        channels: CHANNELS,
+        body: HEADER_LEN,
+        block_len,
+        azimuth: 0,
+        echoes: 2,
+        echo_len,
+        unit_m: header.unit_m(),
+        tail,
+        fields: TAIL,
+        has_sequence: header.has(flag::SEQUENCE),
+        len: end + option(flag::SIGNATURE, SIGNATURE_LEN),
+    }
+}
+
+impl Family for Qt128 {
+    fn id(&self) -> &'static str {
+        "qt128"
+    }
+
+    fn title(&self) -> &'static str {
+        "Hesai QT128C2X"
+    }
+
+    fn layout(&self, payload: &[u8]) -> Option<Layout> {
+        let header = Header::new(payload)?;
+        let is_own =
+            header.protocol == (3, 2) && (header.lasers, header.blocks) == (CHANNELS, BLOCKS);
+        let layout = layout(&header);
+        (is_own && payload.len() == layout.len).then_some(layout)
+    }
+
+    fn nominal(&self) -> &'static Unit {
+        &UNIT
+    }
+
+    fn block_ns(&self, view: &View<'_>, block: usize) -> i64 {
+        FIRST_NS + FIRING_NS * (block / view.return_mode().returns()) as i64
+    }
+
+    fn period_ns(&self, mode: ReturnMode) -> i64 {
+        (BLOCKS / mode.returns().min(BLOCKS)) as i64 * FIRING_NS
+    }
+
+    /// With single returns the blocks are the loops; else the mode of operation tells the packet's loop.
+    fn fire_times(&self, view: &View<'_>, block: usize) -> (usize, usize) {
+        let is_second = if view.return_mode().returns() == 1 {
+            block % 2 == 1
+        } else {
+            view.operation() & 1 == 0
+        };
+        (usize::from(is_second), usize::from(is_second))
+    }
+
+    fn template(&self) -> Vec<u8> {
+        let header = Header {
+            protocol: (3, 2),
+            version: 0,
+            lasers: CHANNELS,
+            blocks: BLOCKS,
+            unit_mm: 4,
+            returns: 1,
+            flags: flag::SEQUENCE | flag::SAFETY | flag::SIGNATURE | flag::CONFIDENCE,
+        };
+        let mut bytes = vec![0; layout(&header).len];
+        header.write(&mut bytes);
+        bytes
+    }
+}

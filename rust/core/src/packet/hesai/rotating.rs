@@ -1,0 +1,419 @@
+//! Decoding and encoding of all models whose packets are blocks of channels, each at one azimuth.
+//!
+//! A point's azimuth is the block's, plus the channel's own, plus what the rotor turns until the channel
+//! fires. Blocks of one firing share an azimuth; which of them holds the nearer return differs from
+//! model to model.
+
+use std::f64::consts::{PI, TAU};
+use std::fmt::Debug;
+
+use super::layout::{Layout, RawPacket, View, write};
+use super::unit::{self, Kind, Unit};
+use crate::cloud::Return;
+use crate::error::UnitError;
+use crate::packet::aim::{add, wrapped};
+use crate::packet::echoes::{MOST, RawEcho, judge};
+use crate::packet::unit::{Fitted, UnitFile};
+use crate::packet::{
+    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
+};
+use crate::time::Timestamp;
+
+const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
+
+/// What the models with blocks differ in.
+pub trait Family: Send + Sync + Debug + Copy + 'static {
+    /// Product name in lower case without the vendor.
+    fn id(&self) -> &'static str;
+
+    /// Name with vendor, for people.
+    fn title(&self) -> &'static str;
+
+    /// Layout of a data packet of this model; `None` for any other payload.
+    fn layout(&self, payload: &[u8]) -> Option<Layout>;
+
+    /// Angles and firing times of a unit that is not known.
+    fn nominal(&self) -> &'static Unit;
+
+    /// Time of a block after the packet's.
+    fn block_ns(&self, view: &View<'_>, block: usize) -> i64;
+
+    /// Time from one packet to the next, as a rule.
+    fn period_ns(&self, mode: ReturnMode) -> i64;
+
+    /// Time from this packet to the next.
+    fn duration_ns(&self, view: &View<'_>) -> i64 {
+        self.period_ns(view.return_mode())
+    }
+
+    /// Numbers of the firing times of a block, for far and for near targets.
+    fn fire_times(&self, _view: &View<'_>, _block: usize) -> (usize, usize) {
+        (0, 0)
+    }
+
+    /// Targets nearer than this have the firing times for near ones.
+    fn near_m(&self) -> f64 {
+        0.0
+    }
+
+    /// Least value of a range that is an echo.
+    fn least_range(&self) -> u16 {
+        1
+    }
+
+    /// Azimuth of a block; `None` where it is none.
+    fn azimuth_rad(&self, view: &View<'_>, block: usize) -> Option<f64> {
+        let raw = view.azimuth(block);
+        (raw < 36_000).then(|| f64::from(raw) * RAD_PER_CENTIDEG)
+    }
+
+    /// How the sensor numbers and stamps its packets.
+    fn counting(&self) -> Counting {
+        Counting {
+            clock_wrap_ns: None,
+            sequence_bits: Some(32),
+        }
+    }
+
+    /// What a payload that is no data packet is to the model.
+    fn companion(&self, _payload: &[u8]) -> Option<PacketKind> {
+        None
+    }
+
+    /// Rotation rate; 0 where a packet does not tell it.
+    fn rate_rad_per_ns(&self, view: &View<'_>) -> f64 {
+        (view.rpm() * TAU / 60e9).max(0.0)
+    }
+
+    /// Azimuth of a block on the scale on which sweeps are cut.
+    fn encoder_rad(&self, view: &View<'_>, block: usize) -> Option<f64> {
+        self.azimuth_rad(view, block)
+    }
+
+    /// Whether a file describes a unit, where it is not the maker's text files that do.
+    fn takes_binary(&self, _file: &UnitFile) -> bool {
+        false
+    }
+
+    /// A decoder for the unit of such a file; `None`: the one that all models with blocks share.
+    fn fit_binary(&self, _files: &[UnitFile]) -> Option<Result<Fitted, UnitError>> {
+        None
+    }
+
+    /// Bytes of an empty packet with its header.
+    fn template(&self) -> Vec<u8>;
+}
+
+/// A model with blocks.
+#[derive(Debug)]
+pub struct Rotating<F>(pub F);
+
+impl<F: Family> Rotating<F> {
+    fn view<'a>(&self, payload: &'a [u8]) -> Option<View<'a>> {
+        View::new(payload, self.0.layout(payload)?)
+    }
+
+    /// Writes a data packet.
+    pub fn encode(&self, packet: &RawPacket) -> Vec<u8> {
+        let mut bytes = self.0.template();
+        if let Some(layout) = self.0.layout(&bytes) {
+            write(&mut bytes, &layout, packet);
+        }
+        bytes
+    }
+}
+
+impl<F: Family> Model for Rotating<F> {
+    fn id(&self) -> &'static str {
+        self.0.id()
+    }
+
+    fn title(&self) -> &'static str {
+        self.0.title()
+    }
+
+    fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
+        let data = self.view(payload).map(|_| PacketKind::Data);
+        data.or_else(|| self.0.companion(payload))
+    }
+
+    fn fits(&self, payload: &[u8]) -> bool {
+        self.view(payload).is_some()
+    }
+
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let why = format!("{} bytes do not fit {}", payload.len(), self.title());
+        Misfit { why, may_be: None }
+    }
+
+    fn head(&self, payload: &[u8]) -> Option<Head> {
+        let view = self.view(payload)?;
+        let rate_rad_per_ns = self.0.rate_rad_per_ns(&view);
+        let duration_ns = self.0.duration_ns(&view);
+        Some(Head {
+            device_ns: (view.time() + self.0.block_ns(&view, 0)).0,
+            sequence: view.sequence(),
+            azimuth_rad: self.0.encoder_rad(&view, 0)?,
+            turned_rad: rate_rad_per_ns * duration_ns as f64,
+            rate_rad_per_ns,
+            duration_ns,
+            left_out: None,
+            return_mode: view.return_mode(),
+        })
+    }
+
+    fn tally(&self, payload: &[u8]) -> Tally {
+        let mut tally = Tally::default();
+        let Some(view) = self.view(payload) else {
+            return tally;
+        };
+        let mode = view.return_mode();
+        for first in firings(&view).filter(|first| self.0.azimuth_rad(&view, *first).is_some()) {
+            for echoes in shots(&view, first, self.0.least_range()) {
+                let (kinds, merged) = judge(mode, &echoes[..mode.returns()]);
+                tally.points += kinds.iter().flatten().count() as u32;
+                tally.merged += merged;
+            }
+        }
+        tally
+    }
+
+    fn period_ns(&self, mode: ReturnMode) -> i64 {
+        self.0.period_ns(mode)
+    }
+
+    fn counting(&self) -> Counting {
+        self.0.counting()
+    }
+
+    fn takes(&self, file: &UnitFile) -> bool {
+        match unit::kind(file) {
+            Some(Kind::Angles) => {
+                unit::angle_channels(file) == Some(self.0.nominal().elevation_rad.len())
+            }
+            Some(Kind::FireTimes) => self
+                .0
+                .nominal()
+                .clone()
+                .with(std::slice::from_ref(file))
+                .is_ok(),
+            Some(Kind::Channels) | None => self.0.takes_binary(file),
+        }
+    }
+
+    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
+        if let Some(fitted) = self.0.fit_binary(files) {
+            return fitted;
+        }
+        let (unit, calibration) = self.0.nominal().clone().with(files)?;
+        Ok(Fitted {
+            decoder: Box::new(RotatingDecoder::new(self.0, &unit)),
+            calibration,
+        })
+    }
+}
+
+/// First blocks of the firings; blocks behind the last whole firing are left over.
+pub fn firings(view: &View<'_>) -> impl Iterator<Item = usize> + use<> {
+    let returns = view.return_mode().returns();
+    (0..view.layout().blocks / returns).map(move |firing| firing * returns)
+}
+
+/// Echoes of the shots of a firing, by channel; ranges below the least are no echo.
+fn shots<'a>(
+    view: &View<'a>,
+    first: usize,
+    least: u16,
+) -> impl Iterator<Item = [RawEcho; MOST]> + 'a {
+    let returns = view.return_mode().returns();
+    let mut blocks = [0, 1, 2].map(|place: usize| view.echoes(first + place.min(returns - 1)));
+    std::iter::from_fn(move || {
+        let [one, two, three] = &mut blocks;
+        Some([one.next()?, two.next()?, three.next()?])
+    })
+    .map(move |mut echoes| {
+        for echo in echoes.iter_mut().filter(|echo| echo.range < least) {
+            echo.range = 0;
+        }
+        echoes
+    })
+}
+
+/// Where a channel points and when it fires.
+#[derive(Debug, Clone, Copy, Default)]
+struct Aim {
+    /// Azimuth after the block's.
+    azimuth_rad: f64,
+    sin_cos: (f64, f64),
+    delay_ns: i64,
+}
+
+/// Aims of all channels in one way to fire, at one speed.
+#[derive(Debug, Clone)]
+struct Aims {
+    rpm: f64,
+    aims: Vec<Aim>,
+}
+
+struct RotatingDecoder<F> {
+    family: F,
+    azimuth_rad: Vec<f64>,
+    elevation: Vec<(f64, f64)>,
+    delays_ns: Vec<Vec<f64>>,
+    aims: Vec<Aims>,
+}
+
+impl<F: Family> RotatingDecoder<F> {
+    fn new(family: F, unit: &Unit) -> Self {
+        let channels = unit.elevation_rad.len();
+        let times = unit.fire_times.iter();
+        let times = times.map(|(_, times)| times.iter().map(|ns| ns.unwrap_or(0.0)).collect());
+        let mut delays_ns: Vec<Vec<f64>> = times.collect();
+        if delays_ns.is_empty() {
+            delays_ns.push(vec![0.0; channels]);
+        }
+        let never = Aims {
+            rpm: f64::NAN,
+            aims: vec![Aim::default(); channels],
+        };
+        Self {
+            family,
+            azimuth_rad: unit.azimuth_rad.clone(),
+            elevation: unit
+                .elevation_rad
+                .iter()
+                .map(|angle| angle.sin_cos())
+                .collect(),
+            aims: vec![never; delays_ns.len()],
+            delays_ns,
+        }
+    }
+
+    /// Brings the aims of one way to fire to a speed.
+    fn aim(&mut self, table: usize, rpm: f64) -> usize {
+        let table = table.min(self.aims.len() - 1);
+        let aims = &mut self.aims[table];
+        if aims.rpm != rpm {
+            aims.rpm = rpm;
+            let channels = self.azimuth_rad.iter().zip(&self.delays_ns[table]);
+            for (aim, (offset_rad, delay_ns)) in aims.aims.iter_mut().zip(channels) {
+                let azimuth_rad = offset_rad + delay_ns * rpm * TAU / 60e9;
+                *aim = Aim {
+                    azimuth_rad,
+                    sin_cos: azimuth_rad.sin_cos(),
+                    delay_ns: delay_ns.round() as i64,
+                };
+            }
+        }
+        table
+    }
+
+    fn firing(&mut self, view: &View<'_>, first: usize, place: Place, out: &mut Decoded) {
+        let Some(block_rad) = self.family.azimuth_rad(view, first) else {
+            return out
+                .drops
+                .add("block_invalid", view.return_mode().returns() as u64);
+        };
+        let (far, near) = self.family.fire_times(view, first);
+        let [far, near] = [far, near].map(|table| self.aim(table, view.rpm()));
+        let (head, near_m) = (block_rad.sin_cos(), self.family.near_m());
+        let firing = Firing {
+            first,
+            encoder_rad: self.family.encoder_rad(view, first).unwrap_or(block_rad),
+            time: place.time + (self.family.block_ns(view, first) - self.family.block_ns(view, 0)),
+            least_range: self.family.least_range(),
+            packet: place.packet,
+        };
+        firing.place(view, out, |channel, range_m| {
+            let table = if range_m < near_m { near } else { far };
+            let aim = self.aims[table].aims.get(channel)?;
+            Some(Ray {
+                azimuth_rad: block_rad + aim.azimuth_rad,
+                azimuth: add(head, aim.sin_cos),
+                elevation: self.elevation[channel],
+                delay_ns: aim.delay_ns,
+            })
+        });
+    }
+}
+
+/// Where a shot goes and when, after its firing.
+#[derive(Debug, Clone, Copy)]
+pub struct Ray {
+    /// Azimuth, not far outside of one turn.
+    pub azimuth_rad: f64,
+    /// Its sine and cosine.
+    pub azimuth: (f64, f64),
+    /// Sine and cosine of the elevation.
+    pub elevation: (f64, f64),
+    /// After the firing.
+    pub delay_ns: i64,
+}
+
+/// One firing of all channels.
+#[derive(Debug, Clone, Copy)]
+pub struct Firing {
+    /// First of its blocks.
+    pub first: usize,
+    /// Azimuth on the scale on which sweeps are cut.
+    pub encoder_rad: f64,
+    /// When it began.
+    pub time: Timestamp,
+    /// Least value of a range that is an echo.
+    pub least_range: u16,
+    /// Number of the packet.
+    pub packet: u32,
+}
+
+impl Firing {
+    /// Places the echoes; `ray` gives the ray of a channel for a range in metres, `None` for no such channel.
+    pub fn place(
+        &self,
+        view: &View<'_>,
+        out: &mut Decoded,
+        ray: impl Fn(usize, f64) -> Option<Ray>,
+    ) {
+        let mode = view.return_mode();
+        let unit_m = view.layout().unit_m;
+        for (channel, echoes) in shots(view, self.first, self.least_range).enumerate() {
+            let (kinds, merged) = judge(mode, &echoes[..mode.returns()]);
+            out.merged += u64::from(merged);
+            for (number, (echo, kind)) in echoes.iter().zip(kinds).enumerate() {
+                let range_m = f64::from(echo.range) * unit_m;
+                let (Some(return_kind), Some(ray)) = (kind, ray(channel, range_m)) else {
+                    continue;
+                };
+                let ((sin, cos), (sin_v, cos_v)) = (ray.azimuth, ray.elevation);
+                let level_m = range_m * cos_v;
+                out.encoder_rad.push(wrapped(self.encoder_rad));
+                out.returns.push(Return {
+                    xyz_m: [level_m * sin, level_m * cos, range_m * sin_v].map(|v| v as f32),
+                    time: self.time + ray.delay_ns,
+                    range_m: range_m as f32,
+                    azimuth_rad: wrapped(ray.azimuth_rad),
+                    ring: channel as u16,
+                    intensity: echo.intensity.into(),
+                    return_index: number as u8,
+                    return_kind,
+                    packet: self.packet,
+                    block: (self.first + number) as u16,
+                });
+            }
+        }
+    }
+}
+
+impl<F: Family> Decoder for RotatingDecoder<F> {
+    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
+        let layout = self.family.layout(payload);
+        let Some(view) = layout.and_then(|layout| View::new(payload, layout)) else {
+            return out.drops.add("packet_size", 1);
+        };
+        let returns = view.return_mode().returns();
+        out.drops
+            .add("block_invalid", (view.layout().blocks % returns) as u64);
+        for first in firings(&view) {
+            self.firing(&view, first, place, out);
+        }
+    }
+}

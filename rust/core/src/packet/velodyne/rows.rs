@@ -1,0 +1,308 @@
+//! Models with 16 or 32 lasers: a block holds all lasers, once or twice, at one azimuth.
+//!
+//! In dual return two blocks hold the same shots: the first the last returns, the second the
+//! strongest (or the second strongest where the last is the strongest).
+
+use super::rotation::Rotation;
+use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
+use crate::cloud::{Return, ReturnKind};
+use crate::error::InvalidValue;
+use crate::packet::aim::{turn, wrapped};
+use crate::packet::beams::{Beam, Beams};
+use crate::packet::echoes::judge;
+use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode, Tally};
+use crate::time::Timestamp;
+
+/// How a model fires.
+#[derive(Debug, Clone, Copy)]
+pub struct Firing {
+    /// Lasers of one unit: 16 or 32.
+    pub lasers: usize,
+    /// Time from one firing of all lasers to the next.
+    pub firing_ns: i64,
+    /// Metres of one unit of range.
+    pub range_unit_m: f64,
+}
+
+impl Firing {
+    /// Time from one block of single returns to the next.
+    const fn row_ns(&self) -> i64 {
+        (CHANNELS / self.lasers) as i64 * self.firing_ns
+    }
+
+    /// Time from one packet to the next.
+    pub fn period_ns(&self, mode: ReturnMode) -> i64 {
+        (BLOCKS / mode.returns()) as i64 * self.row_ns()
+    }
+
+    /// Times and angles of a data packet.
+    pub fn head(&self, payload: &[u8]) -> Option<Head> {
+        let packet = Packet::new(payload)?;
+        let rotation = self.rotation(&packet, 0.0);
+        rotation.is_valid(0).then(|| Head {
+            device_ns: i64::from(packet.timestamp_us()) * 1000,
+            sequence: None,
+            azimuth_rad: rotation.azimuth_rad(0),
+            turned_rad: rotation.turned_rad(),
+            rate_rad_per_ns: rotation.rate_rad_per_ns(),
+            duration_ns: rotation.duration_ns(),
+            left_out: rotation.left_out(),
+            return_mode: packet.return_mode(),
+        })
+    }
+
+    /// Turns data packets into returns.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] where `beams` has another number of channels than the model.
+    pub fn decoder(&self, beams: &Beams) -> Result<Box<dyn Decoder>, InvalidValue> {
+        beams.expect(self.lasers)?;
+        let channel = |place: usize| {
+            let beam = &beams.channels()[place % self.lasers];
+            Channel::new(beam, (place / self.lasers) as i64 * self.firing_ns)
+        };
+        Ok(Box::new(RowsDecoder {
+            firing: *self,
+            channels: std::array::from_fn(channel),
+        }))
+    }
+
+    fn rotation(&self, packet: &Packet<'_>, mean_rate_rad_per_ns: f64) -> Rotation {
+        let rows = (0..BLOCKS).step_by(packet.return_mode().returns());
+        let azimuths = rows.map(|block| packet.azimuth_centideg(block));
+        Rotation::new(azimuths, self.row_ns(), mean_rate_rad_per_ns)
+    }
+}
+
+/// Numbers of points in a data packet.
+pub fn tally(payload: &[u8]) -> Tally {
+    let Some(packet) = Packet::new(payload) else {
+        return Tally::default();
+    };
+    let mut tally = Tally::default();
+    let stride = packet.return_mode().returns();
+    let rows = (0..BLOCKS / stride).filter(|row| is_usable(&packet, *row, stride));
+    for block in rows.map(|row| row * stride) {
+        if stride == 1 {
+            let hits = packet.returns(block).filter(|echo| echo.range != 0);
+            tally.points += hits.count() as u32;
+            continue;
+        }
+        for (last, strongest) in packet.returns(block).zip(packet.returns(block + 1)) {
+            tally.add_pair(last.range, strongest.range);
+        }
+    }
+    tally
+}
+
+/// What a payload is to the models of one bank with the product bytes `products`.
+///
+/// An HDL-64E may have any bytes there; its second block is of the second bank.
+pub fn recognise(payload: &[u8], products: &[u8]) -> Option<PacketKind> {
+    let is_of_two_banks = Packet::new(payload).is_some_and(|packet| packet.bank(1) == Some(1));
+    recognise_product(payload, products).filter(|_| !is_of_two_banks)
+}
+
+/// What a payload is to the models with the product bytes `products`.
+pub fn recognise_product(payload: &[u8], products: &[u8]) -> Option<PacketKind> {
+    if position::Position::new(payload).is_some() {
+        return Some(PacketKind::Position);
+    }
+    let packet = Packet::new(payload)?;
+    let is_mode = matches!(packet.return_mode_byte(), 0x37..=0x39);
+    let is_product = products.contains(&packet.product());
+    (is_mode && is_product && packet.is_lower(0)).then_some(PacketKind::Data)
+}
+
+/// Whether the blocks of a row have the flag and an azimuth within one turn.
+fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
+    let mut blocks = row * stride..(row + 1) * stride;
+    blocks.all(|block| packet.is_lower(block))
+        && packet.azimuth_centideg(row * stride) < TURN_CENTIDEG
+}
+
+/// What decoding needs of one shot.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Channel {
+    /// After the first shot of its row.
+    pub delay_ns: i64,
+    azimuth_offset_rad: f64,
+    cos_elevation: f64,
+    sin_elevation: f64,
+    vertical_offset_m: f64,
+    range_offset_m: f64,
+    ring: u16,
+}
+
+impl Channel {
+    /// A beam that fires `firing_ns` later than its own delay says.
+    pub fn new(beam: &Beam, firing_ns: i64) -> Self {
+        Self {
+            delay_ns: firing_ns + beam.delay_ns,
+            azimuth_offset_rad: beam.azimuth_offset_rad,
+            cos_elevation: beam.elevation_rad.cos(),
+            sin_elevation: beam.elevation_rad.sin(),
+            vertical_offset_m: beam.vertical_offset_m,
+            range_offset_m: beam.range_offset_m,
+            ring: beam.ring,
+        }
+    }
+}
+
+struct RowsDecoder {
+    firing: Firing,
+    channels: [Channel; CHANNELS],
+}
+
+impl Decoder for RowsDecoder {
+    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
+        let Some(packet) = Packet::new(payload) else {
+            return out.drops.add("packet_size", 1);
+        };
+        let rotation = self.firing.rotation(&packet, place.mean_rate_rad_per_ns);
+        let mode = packet.return_mode();
+        let stride = mode.returns();
+        for row in 0..BLOCKS / stride {
+            if !is_usable(&packet, row, stride) {
+                out.drops.add("block_invalid", stride as u64);
+                continue;
+            }
+            let mut shots = Shots::new(
+                rotation.azimuth_rad(row),
+                rotation.rate_rad_per_ns(),
+                Place {
+                    time: place.time + rotation.start_ns(row),
+                    ..place
+                },
+                self.firing.range_unit_m,
+            );
+            let block = row * stride;
+            if stride == 1 {
+                let kind = single_kind(mode);
+                for (channel, echo) in self.channels.iter().zip(packet.returns(block)) {
+                    shots.aim(channel);
+                    shots.echo(channel, echo, 0, kind, block, out);
+                }
+                continue;
+            }
+            let pairs = packet.returns(block).zip(packet.returns(block + 1));
+            for (channel, (last, strongest)) in self.channels.iter().zip(pairs) {
+                shots.pair(channel, [last, strongest], block, out);
+            }
+        }
+    }
+}
+
+/// Meaning of the echoes of a single-return setting.
+pub fn single_kind(mode: ReturnMode) -> ReturnKind {
+    match mode {
+        ReturnMode::Last => ReturnKind::Last,
+        _ => ReturnKind::Strongest,
+    }
+}
+
+/// The shots of one row: where the head points at each of them.
+pub struct Shots {
+    row_azimuth_rad: f64,
+    row_sin_cos: (f64, f64),
+    rate_rad_per_ns: f64,
+    row_time_ns: i64,
+    packet: u32,
+    range_unit_m: f64,
+    // Of the shot that was aimed last.
+    encoder_rad: f64,
+    azimuth_rad: f64,
+    sin_cos: (f64, f64),
+    time_ns: i64,
+}
+
+impl Shots {
+    /// A row at an azimuth and `place.time`.
+    pub fn new(
+        row_azimuth_rad: f64,
+        rate_rad_per_ns: f64,
+        place: Place,
+        range_unit_m: f64,
+    ) -> Self {
+        Self {
+            row_azimuth_rad,
+            row_sin_cos: row_azimuth_rad.sin_cos(),
+            rate_rad_per_ns,
+            row_time_ns: place.time.0,
+            packet: place.packet,
+            range_unit_m,
+            encoder_rad: 0.0,
+            azimuth_rad: 0.0,
+            sin_cos: (0.0, 0.0),
+            time_ns: 0,
+        }
+    }
+
+    /// Points the head to where it is at a channel's shot.
+    #[inline]
+    pub fn aim(&mut self, channel: &Channel) {
+        let turned_rad = self.rate_rad_per_ns * channel.delay_ns as f64;
+        self.encoder_rad = self.row_azimuth_rad + turned_rad;
+        self.azimuth_rad = self.encoder_rad + channel.azimuth_offset_rad;
+        self.sin_cos = turn(self.row_sin_cos, turned_rad + channel.azimuth_offset_rad);
+        self.time_ns = self.row_time_ns.saturating_add(channel.delay_ns);
+    }
+
+    /// Places one echo of the shot that was aimed last.
+    #[inline]
+    pub fn echo(
+        &self,
+        channel: &Channel,
+        echo: RawReturn,
+        return_index: u8,
+        return_kind: ReturnKind,
+        block: usize,
+        out: &mut Decoded,
+    ) {
+        if echo.range == 0 {
+            return;
+        }
+        let range_m = f64::from(echo.range) * self.range_unit_m + channel.range_offset_m;
+        let level_m = range_m * channel.cos_elevation;
+        let (sin, cos) = self.sin_cos;
+        let height_m = range_m * channel.sin_elevation + channel.vertical_offset_m;
+        out.encoder_rad.push(wrapped(self.encoder_rad));
+        out.returns.push(Return {
+            xyz_m: [
+                (level_m * cos) as f32,
+                (-level_m * sin) as f32,
+                height_m as f32,
+            ],
+            time: Timestamp(self.time_ns),
+            range_m: range_m as f32,
+            azimuth_rad: wrapped(self.azimuth_rad),
+            ring: channel.ring,
+            intensity: u16::from(echo.intensity),
+            return_index,
+            return_kind,
+            packet: self.packet,
+            block: block as u16,
+        });
+    }
+
+    /// Places the two echoes of one shot, the second of which stands in block `next` behind the first's.
+    ///
+    /// Which of the two is the brighter cannot be read from the intensity, which is corrected for
+    /// range; so the nearer is called strongest even where the manual makes it the second strongest.
+    pub fn pair(
+        &mut self,
+        channel: &Channel,
+        echoes: [RawReturn; 2],
+        block: usize,
+        out: &mut Decoded,
+    ) {
+        self.aim(channel);
+        let (kinds, merged) = judge(ReturnMode::Dual, &echoes);
+        out.merged += u64::from(merged);
+        for (place, (echo, kind)) in echoes.into_iter().zip(kinds).enumerate() {
+            if let Some(kind) = kind {
+                self.echo(channel, echo, place as u8, kind, block + place, out);
+            }
+        }
+    }
+}
