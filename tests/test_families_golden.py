@@ -1,14 +1,17 @@
-"""Velodyne and Hesai points against independent decoders: samples always, captures where they are."""
+"""Velodyne and Hesai points against independent decoders: samples, and captures if there."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from lidar_deflect import capture
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 SAMPLES = Path(__file__).parent / "data" / "packets"
 CAPTURES = Path(__file__).parents[2] / "shared" / "captures"
@@ -137,7 +140,9 @@ def packets_of_unknown_rate(golden: Golden, found: Columns) -> NDArray[np.generi
         return np.array([0])
     if golden.model != "vlp32c":
         return np.array([], dtype=int)
-    blocks = np.unique(np.column_stack([found["packet"], found["block"]]), axis=0, return_index=True)
+    blocks = np.unique(
+        np.column_stack([found["packet"], found["block"]]), axis=0, return_index=True
+    )
     rows, first = blocks
     azimuth_deg = found["azimuth_deg"][first]
     step_deg = np.abs((np.diff(azimuth_deg) + 180) % 360 - 180)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lidar_deflect.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
 
 __all__ = ["UnitFile", "beside", "named"]
 
@@ -36,7 +38,7 @@ def named(beams: Mapping[str, Any]) -> list[UnitFile]:
 
 
 def beside(captures: Sequence[Path]) -> list[UnitFile]:
-    """Read the files beside captures that have their name: ``tower.pcap`` and ``tower.angle.csv``."""
+    """Read the files beside captures that have their name: ``tower.angle.csv`` of ``tower.pcap``."""
     found: dict[Path, bytes] = {}
     for capture in captures:
         for path in _siblings(capture):
