@@ -38,7 +38,7 @@ def named(beams: Mapping[str, Any]) -> list[UnitFile]:
 
 
 def beside(captures: Sequence[Path]) -> list[UnitFile]:
-    """Read the files beside captures that have their name: ``tower.angle.csv`` of ``tower.pcap``."""
+    """Read the files beside captures that bear their name: ``tower.angle.csv``, ``tower.json``."""
     found: dict[Path, bytes] = {}
     for capture in captures:
         for path in _siblings(capture):
