@@ -1,6 +1,5 @@
-"""Velodyne and Hesai points against independent decoders: samples always, captures where they are."""
+"""Velodyne and Hesai points against independent decoders: samples, and captures where they are."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -42,8 +41,7 @@ HESAI = (
 
 
 def whole(golden: Golden) -> tuple[Path, Path]:
-    found: Iterator[Path] = CAPTURES.glob(f"{golden.name}.pcap*")
-    path = next(found, None)
+    path = next(CAPTURES.glob(f"{golden.name}.pcap*"), None)
     if path is None:
         pytest.skip("the captures are not beside the project")
     return path, CAPTURES / f"{golden.name}.ref.npz"
@@ -137,7 +135,9 @@ def packets_of_unknown_rate(golden: Golden, found: Columns) -> NDArray[np.generi
         return np.array([0])
     if golden.model != "vlp32c":
         return np.array([], dtype=int)
-    blocks = np.unique(np.column_stack([found["packet"], found["block"]]), axis=0, return_index=True)
+    blocks = np.unique(
+        np.column_stack([found["packet"], found["block"]]), axis=0, return_index=True
+    )
     rows, first = blocks
     azimuth_deg = found["azimuth_deg"][first]
     step_deg = np.abs((np.diff(azimuth_deg) + 180) % 360 - 180)

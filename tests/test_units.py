@@ -68,7 +68,9 @@ def test_a_broken_file_is_told_with_its_line(alone: Path) -> None:
     broken = alone.with_name("tower.angle.csv")
     broken.write_text(ANGLES.read_text().replace("12,3.924965", "12,up"))
     opened = capture.open(alone)
-    assert opened.streams[0].beams.startswith("missing: tower.angle.csv, line 13: expected a number")
+    assert opened.streams[0].beams.startswith(
+        "missing: tower.angle.csv, line 13: expected a number"
+    )
     with pytest.raises(InvalidValueError, match="line 13") as caught:
         opened.sweeps()
     assert caught.value.code == "beams.malformed"

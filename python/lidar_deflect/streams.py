@@ -26,8 +26,8 @@ class StreamInfo:
     beams
         Where the angles of the unit come from; begins with ``missing`` where there are none.
     return_mode
-        ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with its two
-        returns in parentheses.
+        ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with
+        its two returns in parentheses.
     rpm
         Turns a minute in the mean.
     packets, lost, duplicated, late, too_late, foreign
