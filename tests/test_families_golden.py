@@ -1,17 +1,13 @@
-"""Velodyne and Hesai points against independent decoders: samples, and captures if there."""
+"""Velodyne and Hesai points against independent decoders: samples, and captures where they are."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from lidar_deflect import capture
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 SAMPLES = Path(__file__).parent / "data" / "packets"
 CAPTURES = Path(__file__).parents[2] / "shared" / "captures"
@@ -45,8 +41,7 @@ HESAI = (
 
 
 def whole(golden: Golden) -> tuple[Path, Path]:
-    found: Iterator[Path] = CAPTURES.glob(f"{golden.name}.pcap*")
-    path = next(found, None)
+    path = next(CAPTURES.glob(f"{golden.name}.pcap*"), None)
     if path is None:
         pytest.skip("the captures are not beside the project")
     return path, CAPTURES / f"{golden.name}.ref.npz"

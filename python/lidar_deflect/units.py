@@ -1,14 +1,10 @@
 """Files that describe single units: the ones the user names, and the ones beside a capture."""
 
-from __future__ import annotations
-
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from lidar_deflect.errors import InvalidValueError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
 
 __all__ = ["UnitFile", "beside", "named"]
 
@@ -38,7 +34,7 @@ def named(beams: Mapping[str, Any]) -> list[UnitFile]:
 
 
 def beside(captures: Sequence[Path]) -> list[UnitFile]:
-    """Read the files beside captures that bear their name: ``tower.angle.csv``, ``tower.json``."""
+    """Read the files beside captures that have their name, as ``tower.csv`` of ``tower.pcap``."""
     found: dict[Path, bytes] = {}
     for capture in captures:
         for path in _siblings(capture):
