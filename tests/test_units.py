@@ -64,6 +64,12 @@ def test_a_file_of_another_model_is_refused(alone: Path) -> None:
     assert caught.value.code == "beams.not_taken"
 
 
+def test_the_channel_file_of_a_qt128_may_be_named() -> None:
+    files = [SAMPLES / f"hesai_qt128_dual.{kind}.csv" for kind in ("angle", "channel_config")]
+    opened = capture.open(SAMPLES / "hesai_qt128_dual.pcap", beams={SOURCE: files})
+    assert opened.streams[0].beams.startswith("hesai_qt128_dual.angle.csv")
+
+
 def test_a_broken_file_is_told_with_its_line(alone: Path) -> None:
     broken = alone.with_name("tower.angle.csv")
     broken.write_text(ANGLES.read_text().replace("12,3.924965", "12,up"))

@@ -197,7 +197,9 @@ impl<F: Family> Model for Rotating<F> {
                 .clone()
                 .with(std::slice::from_ref(file))
                 .is_ok(),
-            Some(Kind::Channels) | None => self.0.takes_binary(file),
+            // Packets of all 128 channels do not need it; it does no harm.
+            Some(Kind::Channels) => self.0.nominal().fire("loop2").is_some(),
+            None => self.0.takes_binary(file),
         }
     }
 
