@@ -6,14 +6,14 @@
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use lidar_deflect_core::capture::{DatagramReader, PcapWriter};
 use lidar_deflect_core::cluster::line::LineParams;
-use lidar_deflect_core::cluster::radius::RadiusModel;
+use lidar_deflect_core::cluster::radius::{Intervals, RadiusModel};
 use lidar_deflect_core::fit::arc::SpanAxis;
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::paper::curves::Degrees;
 use lidar_deflect_core::paper::frame::{FrameParams, RadiusRule};
 use lidar_deflect_core::paper::frames::{Frame, FrameAssembler};
 use lidar_deflect_core::paper::passthrough::PassThrough;
-use lidar_deflect_core::paper::series::{ContourSeries, Sampling};
+use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::{Plane, TipLimits};
 use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, SweepOptions, SweepReader};
 use lidar_deflect_core::synthetic::blade::{BuildErrors, Orientation};
@@ -157,14 +157,27 @@ fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<F
     std::iter::from_fn(|| assembler.pop()).collect()
 }
 
-fn params(poses: &[WorldFromSensor]) -> FrameParams {
+/// Step 6: the intervals of the distance over the whole test, what the first pass is for.
+fn rule(frames: &[Frame], poses: &[WorldFromSensor]) -> RadiusRule {
+    let sensors: Vec<_> = poses
+        .iter()
+        .map(|pose| pose.translation_m().into())
+        .collect();
+    let mut ranges = DistanceRanges::new(sensors.len());
+    ranges.extend(frames, &sensors);
+    let division = |[low, high]: [f64; 2]| Intervals::new(low, high, 8).unwrap();
+    let divisions = ranges.ranges_m().iter().map(|range| range.map(division));
+    RadiusRule::Intervals(divisions.collect())
+}
+
+fn params(poses: &[WorldFromSensor], rule: RadiusRule) -> FrameParams {
     FrameParams {
         sensors_m: poses
             .iter()
             .map(|pose| pose.translation_m().into())
             .collect(),
         model: RadiusModel::new(0.2_f64.to_radians(), 1.5, 0.05, 4).unwrap(),
-        rule: RadiusRule::Continuous,
+        rule,
         min_points: 4,
         strict: false,
         leading_edge: -Vector3::x_axis(),
@@ -193,7 +206,8 @@ fn pipeline(c: &mut Criterion) {
     let (bytes, poses) = capture();
     let report = scan(&bytes);
     let assembled = frames(&bytes, &report, &poses);
-    let params = params(&poses);
+    let by_interval = params(&poses, rule(&assembled, &poses));
+    let by_point = params(&poses, RadiusRule::Continuous);
     let mut group = c.benchmark_group("pipeline");
     group.sample_size(20).throughput(Throughput::Elements(3000));
     group.bench_function("scan", |b| b.iter(|| scan(black_box(&bytes))));
@@ -201,13 +215,16 @@ fn pipeline(c: &mut Criterion) {
         b.iter(|| frames(black_box(&bytes), &report, &poses));
     });
     group.bench_function("clusters, contours, sections", |b| {
-        b.iter(|| sections(black_box(&assembled), &params));
+        b.iter(|| sections(black_box(&assembled), &by_interval));
+    });
+    group.bench_function("the same, a radius per point", |b| {
+        b.iter(|| sections(black_box(&assembled), &by_point));
     });
     group.bench_function("whole, two passes", |b| {
         b.iter(|| {
             let report = scan(black_box(&bytes));
-            frames(&bytes, &report, &poses); // the first pass only asks for distances
-            sections(&frames(&bytes, &report, &poses), &params)
+            let rule = rule(&frames(&bytes, &report, &poses), &poses);
+            sections(&frames(&bytes, &report, &poses), &params(&poses, rule))
         });
     });
     group.finish();
