@@ -117,7 +117,7 @@ impl Scan {
         }
         let options = &self.options;
         let stream = self.streams.entry(key);
-        let stream = stream.or_insert_with(|| Stream::new(options.named_model(&key), datagram));
+        let stream = stream.or_insert_with(|| Stream::new(options.probe(&key), datagram));
         stream.push(datagram, &mut self.shared);
     }
 
@@ -190,6 +190,9 @@ impl Scan {
         files.extend(lidar.gather.as_ref().and_then(|gather| gather.file()));
         files.retain(|file| info.model.takes(file));
         info.calibration = info.model.fit(&files).map(|fitted| fitted.calibration);
+        let facts = info.model.describe(&files);
+        info.return_mode = facts.return_mode.unwrap_or(info.return_mode);
+        info.notes.extend(facts.notes);
         info.unit = files;
         info
     }
@@ -206,9 +209,9 @@ impl Scan {
 }
 
 impl Stream {
-    fn new(named: Option<ModelRef>, datagram: &Datagram<'_>) -> Self {
+    fn new(probe: Probe, datagram: &Datagram<'_>) -> Self {
         Self {
-            state: State::Probing(Probe::new(named)),
+            state: State::Probing(probe),
             packets: 0,
             foreign: 0,
             early_foreign: Vec::new(),
@@ -263,7 +266,7 @@ impl Stream {
                 self.metadata = Some(UnitFile::new(name, datagram.payload));
                 true
             }
-            Some(PacketKind::Inertial) => true,
+            Some(PacketKind::Inertial | PacketKind::Status) => true,
             _ => false,
         }
     }
