@@ -569,7 +569,10 @@ impl Lidar {
         let room = ((to - from) as f64 / period_ns).max(1.0);
         let arrived = self.counts.packets + self.clashing;
         let is_crowded = self.clashing >= 16 && self.clashing * 20 > arrived
-            || self.counts.packets >= 32 && self.counts.packets as f64 > CROWDED * room;
+            // Numbers that follow each other are one sensor's, whatever its model makes of the time.
+            || head.sequence.is_none()
+                && self.counts.packets >= 32
+                && self.counts.packets as f64 > CROWDED * room;
         let is_jump_free = self.last?.segment == 0;
         (is_crowded && (is_jump_free || self.clashing > 0)).then(|| {
             format!(

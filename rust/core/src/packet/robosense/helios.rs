@@ -142,6 +142,11 @@ impl Family for Helios {
         }
     }
 
+    /// As in the driver that the points of the Helios 16P were compared with.
+    fn is_on_grid(&self) -> bool {
+        *self == Self::Half
+    }
+
     fn unit_m(&self, view: &View<'_>) -> f64 {
         if view.is_fine() { 0.0025 } else { 0.005 }
     }
@@ -222,6 +227,7 @@ pub fn returns_in_pairs(view: &View<'_>) -> usize {
 /// Two returns stand in the halves of a block. A shot with one echo has it twice, which shots that follow
 /// each other hardly ever do.
 pub fn returns_in_halves(view: &View<'_>) -> usize {
+    const LEAST: usize = 24;
     let (mut both, mut same) = (0, 0);
     for block in 0..view.blocks() {
         for laser in 0..16 {
@@ -233,7 +239,7 @@ pub fn returns_in_halves(view: &View<'_>) -> usize {
             same += usize::from(one != 0 && one == other);
         }
     }
-    1 + usize::from(both > 0 && 2 * same > both)
+    1 + usize::from(both >= LEAST && 2 * same > both)
 }
 
 /// Whether the two halves of blocks see the same: so they are shots or returns of the same lasers; `None`

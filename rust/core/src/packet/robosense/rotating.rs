@@ -28,6 +28,9 @@ pub const OBTAIN: &str = "record the packets that describe the unit as well (DIF
 const INERTIAL_LEN: usize = 51;
 const INERTIAL_ID: [u8; 4] = [0xAA, 0x55, 0x5A, 0x05];
 
+/// Ranges are whole units, limits are not exact in binary.
+const GUARD_M: f64 = 1e-6;
+
 /// What a channel of a block is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Slot {
@@ -89,13 +92,19 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
     /// What a channel is, in the block at this place of its firing.
     fn slot(&self, returns: usize, place: usize, channel: usize) -> Slot;
 
+    /// Whether what the rotor turns until a shot counts in whole hundredths of a degree.
+    fn is_on_grid(&self) -> bool {
+        false
+    }
+
     /// Metres of one unit of range.
     fn unit_m(&self, view: &View<'_>) -> f64;
 
     /// Where the lasers leave.
     fn lens(&self) -> Lens;
 
-    /// Ranges outside of these are none, metres.
+    /// Ranges up to the first and beyond the second are none, metres: the maker's limits; up to the first
+    /// sensors write it for echoes of their own cover.
     fn limits_m(&self) -> (f64, f64);
 
     /// Angles of a unit that is not known, where single units are near them.
@@ -151,7 +160,8 @@ fn visit<F: Family>(family: &F, view: &View<'_>, turn: &Turn, mut take: impl FnM
     let (least_m, most_m) = family.limits_m();
     let cut = |mut echo: RawEcho| {
         let range_m = f64::from(echo.range) * unit_m;
-        if !(least_m..=most_m).contains(&range_m) {
+        let is_within = range_m > least_m + GUARD_M && range_m <= most_m + GUARD_M;
+        if !is_within {
             echo.range = 0;
         }
         echo
@@ -295,25 +305,42 @@ impl<F: Family> Model for Rotating<F> {
             .filter_map(|file| Some((file, difop::packet(file)?)));
         let told = packets.filter_map(|(file, bytes)| {
             let difop = Difop::new(&bytes)?;
-            Some((file, self.0.told(&difop)?, self.0.mode(difop.return_mode())))
+            let settings = Settings {
+                mode: self.0.mode(difop.return_mode()),
+                rpm: Some(difop.rpm()),
+            };
+            Some((file, self.0.told(&difop)?, settings))
         });
-        let (angles, mode, calibration) = match told.into_iter().next() {
-            Some((file, angles, mode)) => {
-                (angles, mode, Calibration::of(&[file], Calibration::Factory))
-            }
+        let (angles, settings, calibration) = match told.into_iter().next() {
+            Some((file, angles, settings)) => (
+                angles,
+                settings,
+                Calibration::of(&[file], Calibration::Factory),
+            ),
             None => {
                 let angles = self.0.nominal().ok_or(UnitError::Missing {
                     model: self.0.title(),
                     obtain: OBTAIN,
                 })?;
-                (angles, None, Calibration::Nominal { obtain: OBTAIN })
+                (
+                    angles,
+                    Settings::default(),
+                    Calibration::Nominal { obtain: OBTAIN },
+                )
             }
         };
         Ok(Fitted {
-            decoder: Box::new(RotatingDecoder::new(self.0, &angles, mode)),
+            decoder: Box::new(RotatingDecoder::new(self.0, &angles, settings)),
             calibration,
         })
     }
+}
+
+/// What a unit is set to, where it says so.
+#[derive(Debug, Clone, Copy, Default)]
+struct Settings {
+    mode: Option<ReturnMode>,
+    rpm: Option<u16>,
 }
 
 /// One laser.
@@ -327,11 +354,11 @@ struct Laser {
 struct RotatingDecoder<F> {
     family: F,
     lasers: Vec<Laser>,
-    mode: Option<ReturnMode>,
+    settings: Settings,
 }
 
 impl<F: Family> RotatingDecoder<F> {
-    fn new(family: F, angles: &Angles, mode: Option<ReturnMode>) -> Self {
+    fn new(family: F, angles: &Angles, settings: Settings) -> Self {
         let elevations = &angles.elevation_rad;
         // Rings count from the lowest laser; of equal ones the first is lower.
         let ring = |laser: usize| {
@@ -350,13 +377,13 @@ impl<F: Family> RotatingDecoder<F> {
         Self {
             family,
             lasers: lasers.collect(),
-            mode,
+            settings,
         }
     }
 
     /// The mode of a packet: what the unit says, unless the packet has another number of returns.
     fn mode_of(&self, returns: usize) -> ReturnMode {
-        let told = self.mode.filter(|mode| mode.returns() == returns);
+        let told = self.settings.mode.filter(|mode| mode.returns() == returns);
         told.unwrap_or(match returns {
             1 => ReturnMode::Strongest,
             _ => ReturnMode::Dual,
@@ -388,6 +415,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             (view.layout().blocks - view.blocks()) as u64,
         );
         let turn = Turn::of(&self.family, &view, place.mean_rate_rad_per_ns);
+        let turn = turn.with_speed(self.settings.rpm);
         let (unit_m, mode) = (
             self.family.unit_m(&view),
             self.mode_of(self.family.returns(&view)),

@@ -29,6 +29,9 @@ pub struct Turn {
     /// Rotation rate over many packets, or within this one.
     rate_rad_per_ns: f64,
     firing_ns: f64,
+    /// Step behind the last firing and before a gap.
+    last_step_rad: f64,
+    is_on_grid: bool,
 }
 
 impl Turn {
@@ -45,9 +48,12 @@ impl Turn {
             gap: None,
             rate_rad_per_ns: 0.0,
             firing_ns: family.firing_ns(returns),
+            last_step_rad: 0.0,
+            is_on_grid: family.is_on_grid(),
         };
         turn.find_firings(view, full);
         turn.find_steps();
+        turn.last_step_rad = turn.step_rad;
         let own = turn.step_rad / turn.firing_ns;
         turn.rate_rad_per_ns = if mean_rate_rad_per_ns > 0.0 {
             mean_rate_rad_per_ns
@@ -55,6 +61,15 @@ impl Turn {
             own
         };
         turn
+    }
+
+    /// Where no firing follows, the rotor turns at the speed that it is set to, as the maker has it.
+    pub fn with_speed(mut self, rpm: Option<u16>) -> Self {
+        if let Some(rpm) = rpm.filter(|rpm| *rpm > 0) {
+            let step_rad = f64::from(rpm) * TAU / 60e9 * self.firing_ns;
+            self.last_step_rad = (step_rad / RAD_PER_CENTIDEG).round() * RAD_PER_CENTIDEG;
+        }
+        self
     }
 
     /// Blocks of one firing share an azimuth. A first firing that is not whole began before the packet.
@@ -124,11 +139,17 @@ impl Turn {
         let next = firing + 1;
         let is_last = next >= self.firings || self.gap.is_some_and(|(before, _)| before == firing);
         let step_rad = if is_last {
-            self.step_rad
+            self.last_step_rad
         } else {
             (self.azimuth_rad(next) - self.azimuth_rad(firing)).rem_euclid(TAU)
         };
-        step_rad * delay_ns as f64 / self.firing_ns
+        let turned_rad = step_rad * delay_ns as f64 / self.firing_ns;
+        if self.is_on_grid {
+            // Steps are whole hundredths; a quotient just below one is one.
+            (turned_rad / RAD_PER_CENTIDEG + 1e-6).floor() * RAD_PER_CENTIDEG
+        } else {
+            turned_rad
+        }
     }
 
     /// Time of a firing after the packet's, over a gap from the rotation rate.
