@@ -337,11 +337,10 @@ fn check(writer: &Writer, returns: usize, number: u32, at: Echo<'_>) {
         });
         assert!(is_written, "{id}: {echo:?}");
         let since_ns = echo.time - Timestamp(head.device_ns);
-        assert!(
-            (0..=head.duration_ns).contains(&since_ns),
-            "{id}: {since_ns} of {}",
-            head.duration_ns
-        );
+        // A firing of which the next packet has the second return counts half.
+        let is_shared = id.starts_with("ruby") && returns == 2;
+        let most_ns = head.duration_ns + i64::from(is_shared) * 56_000;
+        assert!((0..=most_ns).contains(&since_ns), "{id}: {since_ns} of {most_ns}");
     }
 }
 
