@@ -9,7 +9,7 @@ mod puck;
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use lidar_deflect_core::packet::velodyne::puck::{FIRING_NS, LASER_NS};
+use lidar_deflect_core::packet::velodyne::puck::{FIRING_NS, LASER_NS, VLP16};
 use lidar_deflect_core::packet::velodyne::{BLOCKS, Packet};
 use lidar_deflect_core::packet::{Decoded, Place, ReturnMode, model};
 use lidar_deflect_core::stream::{Scan, ScanOptions, SweepOptions, SweepReader};
@@ -53,6 +53,7 @@ fn second(mode: ReturnMode) -> Vec<Sent> {
 fn decode(c: &mut Criterion) {
     let mut group = c.benchmark_group("decode");
     let model = model("vlp16").unwrap();
+    let beams = VLP16.beams();
     let cos_sin = std::array::from_fn(|laser| {
         let (sin, cos) = beams.channels()[laser].elevation_rad.sin_cos();
         (cos, sin)

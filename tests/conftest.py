@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,9 @@ import pytest
 
 from lidar_deflect import scene as scenes
 from lidar_deflect.simulation import simulate
+
+SCRATCH = tempfile.TemporaryDirectory(prefix="lidar-deflect-tests-")
+"""Where commands run that are given no other place, so that none writes into the project."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +29,7 @@ def command_line(*arguments: str | Path, cwd: Path | None = None, **environment:
     """Run the real command in a process of its own."""
     done = subprocess.run(
         [sys.executable, "-m", "lidar_deflect", *map(str, arguments)],
-        cwd=cwd,
+        cwd=cwd or SCRATCH.name,
         env={**os.environ, **environment},
         capture_output=True,
         text=True,

@@ -1,4 +1,4 @@
-"""The complete simulated tests beside the project, where they are: configuration from their survey."""
+"""The complete simulated tests beside the project: configuration from their survey."""
 
 import json
 from pathlib import Path

@@ -63,6 +63,21 @@ def test_info_is_one_document(two: Path) -> None:
     assert document["captures"][0]["records"] == 1507 + 1504 + 20
 
 
+def test_quick_info_reads_head_and_tail(tmp_path: Path) -> None:
+    path = write_pcap(tmp_path / "long.pcap", puck(20.0))
+    document = capture.open(path).info(quick=True)
+    whole = capture.open(path)
+    stream = document["streams"][0]
+    assert document["quick"]
+    assert 1500 < stream["packets"] < 1520
+    assert stream["model"] == "vlp16"
+    assert stream["last_utc"] == document["last_utc"] == whole.info()["last_utc"]
+    assert document["first_utc"] == whole.info()["first_utc"]
+    short = write_pcap(tmp_path / "short.pcap", puck(0.3))
+    assert capture.open(short).info(quick=True)["last_utc"] is None
+    assert not whole.info(quick=True)["quick"]  # it was read already
+
+
 def test_sweeps_are_turns_with_columns_of_one_length(two: Path) -> None:
     opened = capture.open(two)
     sweeps = list(opened.sweeps("192.168.1.202", cut_azimuth_deg=90.0))
@@ -142,8 +157,8 @@ def test_no_lidar_names_the_closest_stream(tmp_path: Path) -> None:
     assert error.code == "capture.no_lidar"
     assert error.facts[0] == ("read", "376 packets in 1 UDP streams")
     closest = dict(error.facts)["closest"]
-    assert closest.startswith("192.168.1.201 -> port 2368, 1206 bytes, 754/s: the size fits")
-    assert "0x00 0x00" in closest
+    assert closest.startswith("192.168.1.201 -> port 2368, 1206 bytes, 754/s: the bytes fit")
+    assert "HDL-32E, the packet period of 1327 us does not" in closest
     assert error.hint == "name the model: --sensor 192.168.1.201=vlp16"
     named = capture.open(path, sensors={"192.168.1.201": "vlp16"})
     assert named.streams[0].packets == 376
@@ -250,3 +265,9 @@ def test_lost_packets_of_the_scenes_equal_the_truth(scene: str) -> None:
     assert found == {
         lidar["source"]: (lidar["packets_lost"], lidar["packets_sent"]) for lidar in truth
     }
+
+
+def test_the_page_of_sensors_lists_every_model() -> None:
+    page = (Path(__file__).parents[1] / "docs" / "sensors.md").read_text()
+    listed = {line.split("`")[1] for line in page.splitlines() if line.startswith("| `")}
+    assert listed == {model for model, _ in capture.sensor_models()}

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ from lidar_deflect import config
 from lidar_deflect.cli import failure, options, talk, units
 from lidar_deflect.cli.app import COMMANDS, app, run
 from lidar_deflect.errors import CaptureError, LidarDeflectError, OutputError
+from lidar_deflect.files import uninterrupted
 
 HEAVY = {"numpy", "polars", "pydantic", "plotly", "tomlkit", "rich", "lidar_deflect._native"}
 EVERY_KEY = Path(__file__).parent / "data" / "config" / "every_key.toml"
@@ -230,3 +232,18 @@ def test_only_named_lidars_and_sections_stay_with_what_belongs_to_them() -> None
     assert units.narrowed(whole, None, ["S84"]).sections == whole.sections
     with pytest.raises(Exception, match="expected one of S84"):
         units.narrowed(whole, None, ["S85"])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals differ on Windows")
+def test_an_interrupt_waits_for_a_file_to_be_whole() -> None:
+    done = []
+
+    def block() -> None:
+        with uninterrupted():
+            signal.raise_signal(signal.SIGINT)
+            done.append("block")
+        done.append("after")
+
+    with pytest.raises(KeyboardInterrupt):
+        block()
+    assert done == ["block"]

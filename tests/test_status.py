@@ -9,7 +9,13 @@ from lidar_deflect.measurement.states import (
     MISSING,
     OK,
 )
-from lidar_deflect.measurement.status import Uses, extrapolate, grade_frames, interpolate
+from lidar_deflect.measurement.status import (
+    Uses,
+    extrapolate,
+    grade_frames,
+    interpolate,
+    refuse_stretched,
+)
 
 REFERENCE = np.array([100.0, 100.0])
 NO_FAILURE = np.array([None], dtype=object)
@@ -58,6 +64,17 @@ def test_sections_outside_of_the_scan_lines_are_extrapolated():
     extrapolate(status, reason, np.array([[80.0, 100.0, 106.0, np.nan]]), np.array([[84, 104.0]]))
     assert status.tolist() == [[EXTRAPOLATED, OK, EXTRAPOLATED, MISSING]]
     assert reason.tolist() == [["before_first_line", None, "beyond_last_line", None]]
+
+
+def test_a_section_beyond_its_own_arc_length_is_refused():
+    position = np.array([[[17.0, 0.0, 82.0], [30.0, 0.0, 115.0]]])
+    status = np.array([[OK, OK]], np.uint8)
+    reason = np.full((1, 2), None, dtype=object)
+    refuse_stretched(status, reason, position, np.array([84.0, 110.0]))
+    assert status.tolist() == [[OK, MISSING]]
+    assert reason.tolist() == [[None, "stretched"]]
+    assert np.isnan(position[0, 1]).all()
+    assert not np.isnan(position[0, 0]).any()
 
 
 def test_overhead_rows_are_filled_between_and_never_beyond():

@@ -50,7 +50,7 @@ def test_the_wheel_carries_types_and_licences(wheel: Path) -> None:
 def _pins(folder: Path) -> Path:
     """Return the pinned versions as constraints: the wheel itself must name what it needs."""
     text = (ROOT / "requirements" / "run.txt").read_text(encoding="utf-8")
-    pins = re.findall(r"^([\w.\-\[\]]+==[^\s;\\]+)", text, flags=re.MULTILINE)
+    pins = re.findall(r"^([\w.\-]+==[^\\\n]+)", text, flags=re.MULTILINE)
     path = folder / "constraints.txt"
     path.write_text("\n".join(pins) + "\n", encoding="utf-8")
     return path

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "CaptureScan",
+    "ContourCurves",
     "ContourPass",
     "DistancePass",
     "FrameParams",
@@ -19,13 +20,34 @@ __all__ = [
     "Sweep",
     "SweepIterator",
     "__version__",
+    "arc_length",
     "check_captures",
+    "curve_distances",
+    "curve_points",
     "cut_capture",
+    "dbscan",
+    "dbscan_radii",
+    "fit_line",
+    "fit_plane",
+    "fit_polynomial",
+    "line_clusters",
+    "line_extremes",
+    "pass_through",
+    "polynomial_powers",
+    "polynomial_slopes",
+    "polynomial_values",
+    "polynomial_variances",
+    "radii_at",
+    "radii_of",
     "reference_blades",
+    "right_edges",
     "rotation_about_up",
     "rotation_onto",
     "scan_capture",
+    "scan_quickly",
     "sensor_models",
+    "sensor_table",
+    "walk_arc",
     "yaw_from_wall",
 ]
 
@@ -48,7 +70,15 @@ def scan_capture(
     units: Sequence[tuple[str | None, str, bytes, bool]],
     progress: Callable[[int, int], None] | None = None,
 ) -> CaptureScan: ...
+def scan_quickly(
+    paths: Sequence[Path],
+    *,
+    sensors: Sequence[tuple[str, str]],
+    units: Sequence[tuple[str | None, str, bytes, bool]],
+    head_s: float,
+) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
 def sensor_models() -> list[tuple[str, str]]: ...
+def sensor_table() -> list[list[str]]: ...
 
 @final
 class CaptureScan:
@@ -250,3 +280,75 @@ class ContourPass:
     def rejected(
         self,
     ) -> tuple[NDArray[np.int64], list[str], NDArray[np.uint32], NDArray[np.float64]]: ...
+
+_Cloud = NDArray[np.float32] | NDArray[np.float64]
+_Vector = tuple[float, float, float]
+_RadiusModel = tuple[float, float, float, int]
+_Polynomial = tuple[list[float], float, float]
+_Curve = tuple[int, tuple[_Polynomial, _Polynomial]]
+_ContourCluster = tuple[
+    int, int, list[float], tuple[_Polynomial, _Polynomial], bool, int, float, bool
+]
+
+def dbscan(
+    xyz: _Cloud, radius_m: float, min_points: int, strict: bool, threads: int | None
+) -> NDArray[np.int32]: ...
+def dbscan_radii(
+    xyz: _Cloud,
+    radii_m: NDArray[np.float64],
+    min_points: int,
+    strict: bool,
+    threads: int | None,
+) -> NDArray[np.int32]: ...
+def radii_at(raw: _RadiusModel, distances_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def radii_of(raw: _RadiusModel, xyz: _Cloud, origin_m: _Vector) -> NDArray[np.float64]: ...
+def right_edges(
+    min_m: float, max_m: float, count: int, distances_m: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def line_clusters(
+    samples_m: NDArray[np.float64],
+    labels: NDArray[np.int32],
+    axis: int,
+    degrees: tuple[int, int],
+    reach_m: float,
+) -> tuple[list[_ContourCluster], int, NDArray[np.bool_], int]: ...
+def fit_plane(
+    xyz: _Cloud, towards_m: _Vector, threads: int | None
+) -> tuple[tuple[list[float], float, list[float]], NDArray[np.float64], float, int]: ...
+def fit_line(
+    xyz: _Cloud, along: _Vector, threads: int | None
+) -> tuple[tuple[list[float], list[float]], NDArray[np.float64], float, int]: ...
+def fit_polynomial(
+    abscissas: NDArray[np.float64], ordinates: NDArray[np.float64], degree: int
+) -> tuple[_Polynomial, NDArray[np.float64], float, int]: ...
+def polynomial_values(polynomial: _Polynomial, t: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def polynomial_slopes(polynomial: _Polynomial, t: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def polynomial_variances(
+    polynomial: _Polynomial, covariance: NDArray[np.float64], t: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def polynomial_powers(polynomial: _Polynomial) -> NDArray[np.float64]: ...
+def arc_length(raw: _Curve, from_m: float, to_m: float, tolerance_m: float) -> float: ...
+def walk_arc(raw: _Curve, from_m: float, length_m: float, tolerance_m: float) -> float: ...
+def curve_points(raw: _Curve, t_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def curve_distances(raw: _Curve, xyz: NDArray[np.float64]) -> NDArray[np.float64]: ...
+def pass_through(xyz: NDArray[np.float32], box_m: NDArray[np.float64]) -> NDArray[np.bool_]: ...
+def line_extremes(
+    xyz: NDArray[np.float32], ring: NDArray[np.uint16], leading_edge: NDArray[np.float64]
+) -> tuple[NDArray[np.uint16], NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
+class ContourCurves:
+    def __new__(
+        cls,
+        leading_m: NDArray[np.float64],
+        trailing_m: NDArray[np.float64],
+        *,
+        degree_yoz: int,
+        degree_xoz: int,
+    ) -> ContourCurves: ...
+    def at(
+        self, z_m: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+    def tip(self, plane: str, max_u_m: float) -> tuple[float, float]: ...
+    def length_m(self, from_z_m: float, to_z_m: float) -> float: ...
+    def before_m(self, tip_z_m: float, length_m: float) -> list[float]: ...

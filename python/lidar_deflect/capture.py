@@ -3,7 +3,7 @@
 import html
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -23,10 +23,22 @@ Progress = Callable[[int, int], None]
 
 INFO_SCHEMA = "lidar-deflect.info/1"
 
+QUICK_HEAD_S = 2.0
+"""What of the start of a capture `Capture.info` reads when it is told to be quick."""
+
 RETURN_KINDS = ("strongest", "last", "first", "second", "merged")
 """Names of the numbers in `Sweep.return_kind`."""
 
 NANOS_PER_SECOND = 1_000_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class _Found:
+    """What a scan found."""
+
+    scan: _native.CaptureScan
+    streams: tuple[StreamInfo, ...]
+    described: Mapping[str, Any]
 
 
 class Sweeps(Iterator[Sweep]):
@@ -61,9 +73,7 @@ class Capture:
         self._units = tuple(files)
         self._sensors = dict(sensors)
         self._ids = dict(ids)
-        self._scan: _native.CaptureScan | None = None
-        self._streams: tuple[StreamInfo, ...] = ()
-        self._described: dict[str, Any] = {}
+        self._found: _Found | None = None
 
     def scan(self, progress: Progress | None = None) -> None:
         """Read the files once, if that was not done yet; everything else does so by itself.
@@ -73,21 +83,25 @@ class Capture:
         CaptureError
             If there is no lidar in them (``capture.no_lidar``), or a file is no capture.
         """
-        if self._scan is not None:
-            return
-        scan = _native.scan_capture(
-            self.paths,
-            sensors=list(self._sensors.items()),
-            units=self._units,
-            progress=progress,
-        )
+        if self._found is None:
+            named = list(self._sensors.items())
+            scan = _native.scan_capture(
+                self.paths, sensors=named, units=self._units, progress=progress
+            )
+            self._found = self._judge(scan)
+
+    def _judge(self, scan: _native.CaptureScan) -> "_Found":
         described = scan.describe()
         if not described["streams"]:
-            raise no_lidar(self.paths, described)
+            raise no_lidar(self.paths, described, sensor_models())
         found = tuple(stream(entry) for entry in described["streams"])
-        self._streams = _named(found, self._ids)
-        self._described = described
-        self._scan = scan
+        return _Found(scan, _named(found, self._ids), described)
+
+    @property
+    def _findings(self) -> "_Found":
+        self.scan()
+        assert self._found is not None
+        return self._found
 
     @property
     def sensors(self) -> Mapping[str, str]:
@@ -97,15 +111,12 @@ class Capture:
     @property
     def native(self) -> _native.CaptureScan:
         """The scan of the compiled core, for functions that read the capture there."""
-        self.scan()
-        assert self._scan is not None
-        return self._scan
+        return self._findings.scan
 
     @property
     def streams(self) -> tuple[StreamInfo, ...]:
         """All lidars that were found, ordered by address and port."""
-        self.scan()
-        return self._streams
+        return self._findings.streams
 
     @property
     def lidars(self) -> tuple[str, ...]:
@@ -131,8 +142,7 @@ class Capture:
     @property
     def drops(self) -> Mapping[str, int]:
         """Records, datagrams and packets that gave no points, by reason."""
-        self.scan()
-        pairs = self._described["drops"]
+        pairs = self._findings.described["drops"]
         return MappingProxyType({pair["reason"]: pair["count"] for pair in pairs})
 
     def info(self, quick: bool = False, *, progress: Progress | None = None) -> dict[str, Any]:
@@ -141,25 +151,26 @@ class Capture:
         Parameters
         ----------
         quick
-            Read only as much as tells the sensors apart, if the capture was not read yet.
+            Read only the first two seconds and, where the files are not compressed, their ends;
+            unless the capture was read already. Counts are then those of the two seconds, and
+            ``last_utc`` is None where the end could not be told.
         progress
             Called with bytes done and in total.
         """
-        del quick
+        if quick and self._found is None:
+            return self._quick_info()
         self.scan(progress)
-        described = self._described
-        return {
-            "schema": INFO_SCHEMA,
-            "captures": [_file(entry) for entry in described["captures"]],
-            "streams": [stream.document() for stream in self._streams],
-            "other_streams": described["other_streams"],
-            "drops": described["drops"],
-            "fragments": described["fragments"],
-            "datagrams": described["datagrams"],
-            "pauses": [[utc(start), utc(stop)] for start, stop in described["pauses_ns"]],
-            "first_utc": utc(self.first_time_ns),
-            "last_utc": utc(self.last_time_ns),
-        }
+        return _document(self._findings, {s.address: s.last_ns for s in self.streams}, quick=False)
+
+    def _quick_info(self) -> dict[str, Any]:
+        named = list(self._sensors.items())
+        scan, ends = _native.scan_quickly(
+            self.paths, sensors=named, units=self._units, head_s=QUICK_HEAD_S
+        )
+        last_ns: dict[str, int] = {}
+        for address, end_ns in ends:
+            last_ns[address] = max(end_ns, last_ns.get(address, end_ns))
+        return _document(self._judge(scan), last_ns, quick=True)
 
     def health(self) -> dict[str, NDArray[Any]]:
         """Count what arrived per second and lidar.
@@ -172,7 +183,7 @@ class Capture:
             ``points``, ``rpm`` and ``clock_offset_s`` (NaN where nothing arrived), ``coverage``.
         """
         columns = self.native.health()
-        names = {stream.address: stream.lidar for stream in self._streams}
+        names = {stream.address: stream.lidar for stream in self.streams}
         columns["lidar"] = np.array([names[address] for address in columns["lidar"]], dtype=str)
         kept = np.isin(columns["lidar"], self.lidars)
         return {name: np.asarray(column)[kept] for name, column in columns.items()}
@@ -264,10 +275,10 @@ class Capture:
 
     def __repr__(self) -> str:
         names = ", ".join(path.name for path in self.paths)
-        if self._scan is None:
+        if self._found is None:
             return f"<Capture {names}: not read yet>"
         seconds = (self.last_time_ns - self.first_time_ns) / NANOS_PER_SECOND
-        return f"<Capture {names}: {len(self._streams)} lidars, {seconds:.1f} s>"
+        return f"<Capture {names}: {len(self.streams)} lidars, {seconds:.1f} s>"
 
     def _repr_html_(self) -> str:
         header = ("lidar", "model", "return", "rpm", "packets", "lost", "late", "clock")
@@ -331,7 +342,7 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     paths = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
     _native.check_captures(paths)
     lidars = _lidars_of(config)
-    own = {lidar.source or "": lidar.beams for lidar in lidars if lidar.beams}
+    own = {lidar.source or "": files for lidar in lidars if (files := getattr(lidar, "beams", ()))}
     files = units.named(own | dict(beams or {})) + units.beside(paths)
     ids = {lidar.id: lidar.source for lidar in lidars}
     named = {lidar.source: lidar.model for lidar in lidars if lidar.source}
@@ -355,6 +366,29 @@ def _lidars_of(config: Any) -> Sequence[Any]:
     """Lidars of a `Config`, or of a `Test` that holds one."""
     holder = getattr(config, "config", config)
     return tuple(getattr(holder, "lidars", ()))
+
+
+def _document(found: _Found, last_ns: Mapping[str, int], *, quick: bool) -> dict[str, Any]:
+    """Make the document of ``info --json``; `last_ns` goes by address."""
+    described = found.described
+    ends = [last_ns.get(stream.address) for stream in found.streams]
+    known = [end for end in ends if end is not None]
+    return {
+        "schema": INFO_SCHEMA,
+        "quick": quick,
+        "captures": [_file(entry) for entry in described["captures"]],
+        "streams": [
+            stream.document() | {"last_utc": None if end is None else utc(end)}
+            for stream, end in zip(found.streams, ends, strict=True)
+        ],
+        "other_streams": described["other_streams"],
+        "drops": described["drops"],
+        "fragments": described["fragments"],
+        "datagrams": described["datagrams"],
+        "pauses": [[utc(start), utc(stop)] for start, stop in described["pauses_ns"]],
+        "first_utc": utc(int(found.scan.first_time_ns or 0)),
+        "last_utc": utc(max(known)) if known else None,
+    }
 
 
 def _named(

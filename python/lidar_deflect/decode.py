@@ -272,7 +272,9 @@ class ParquetFile(_TableFile):
         metadata = tables.own_metadata("decoded") | {tables.HASH_KEY: digest}
         schema = tables.SCHEMAS["decoded"].schema
         source = register_io_source(frames, schema=schema, is_pure=True)
-        source.sink_parquet(self.path, metadata=metadata)
+        # An open file, not its name: after an interrupt polars would create it anew.
+        with self.path.open("wb") as file:
+            source.sink_parquet(file, metadata=metadata)
 
 
 class _Discarded(Exception):  # noqa: N818 - a signal, not an error

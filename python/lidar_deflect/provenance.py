@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from lidar_deflect.config import Config
     from lidar_deflect.measurement import Inputs, States
-    from lidar_deflect.pipeline import Setup
+    from lidar_deflect.opened import OpenedTest
 
 SCHEMA = "lidar-deflect.run/1"
 HASH_BLOCK = 1 << 20
@@ -38,7 +38,7 @@ class Stopwatch:
 
 
 def run_document(
-    setup: Setup,
+    opened: OpenedTest,
     inputs: Inputs,
     states: States,
     method: str,
@@ -49,11 +49,11 @@ def run_document(
     return {
         "schema": SCHEMA,
         "versions": versions(),
-        "test": setup.config.test.id,
+        "test": opened.config.test.id,
         "method": method,
-        "inputs": [file_facts(path) for path in setup.paths],
-        "capture": setup.capture.info(),
-        "absent_lidars": list(setup.absent),
+        "inputs": [file_facts(path) for path in opened.paths],
+        "capture": opened.capture.info(),
+        "absent_lidars": list(opened.absent),
         "calibration": {
             "method": inputs.calibration.method,
             "warnings": list(inputs.calibration.warnings),
@@ -61,7 +61,7 @@ def run_document(
         "evidence": states.evidence,
         "warnings": [*inputs.calibration.warnings, *states.warnings],
         "timings_s": {stage: round(seconds, 3) for stage, seconds in watch.laps.items()},
-        "gates": gates(setup.config, health, setup.absent),
+        "gates": gates(opened.config, health, opened.absent),
     }
 
 

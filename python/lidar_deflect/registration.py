@@ -115,6 +115,22 @@ def ground_points(
     return np.asarray(xyz[in_band & below])
 
 
+def rotation_onto(
+    from_direction: NDArray[np.float64], to_direction: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the smallest rotation that carries one direction onto another, shape (3, 3).
+
+    Equations (7) and (8); the printed factor of (8) is a rotation at 90 degrees only, and is
+    corrected to (1 - n.a) / |v|^2. Opposite directions are a half turn.
+
+    Raises
+    ------
+    InvalidValueError
+        If a direction has no length.
+    """
+    return _native.rotation_onto(from_direction, to_direction)
+
+
 def surveyed_plane(points_m: NDArray[np.float64]) -> Wall:
     """Plane through surveyed points of a wall, shape (n, 3) with n >= 3, world frame."""
     if len(points_m) < 3:
@@ -169,7 +185,7 @@ def register(
         )
     ground = fit_plane(seen, towards_m=np.zeros(3))  # steps 2, 3: equations (2)-(6)
     normal = mounting @ ground.normal
-    levelling = _native.rotation_onto(normal, UP)  # step 4: equations (7), (8), corrected
+    levelling = rotation_onto(normal, UP)  # step 4: equations (7), (8), corrected
     rotation = levelling @ mounting
     yaw = _wall_yaw(xyz @ rotation.T.astype(np.float32), position_m, mounting_u_deg, wall, ground)
     if yaw is not None:

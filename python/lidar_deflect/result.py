@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from lidar_deflect import config as configs
 from lidar_deflect import tables
 from lidar_deflect.calibration import Calibration
-from lidar_deflect.errors import ResultNotFoundError
 from lidar_deflect.files import whole_folder
+from lidar_deflect.folder import Folder
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -130,25 +130,15 @@ class Result:
         ------
         ResultNotFoundError
             If it is not one.
+        ConfigError, CalibrationError
+            If its configuration or calibration cannot be read.
         """
-        folder = Path(folder)
-        missing = [
-            name
-            for name in ("run.json", "test.toml", "calibration.toml", "deflection.parquet")
-            if not (folder / name).is_file()
-        ]
-        if missing:
-            raise ResultNotFoundError(
-                f"{folder} is no result folder",
-                code="result.not_found",
-                facts=[("missing", ", ".join(missing))],
-                hint="make one: lidar-deflect measure -c test.toml CAPTURE -o results/",
-            )
+        folder = Folder(folder).path
         frames = {path.stem: tables.read(path) for path in sorted(folder.glob("*.parquet"))}
         return cls(
             frames,
             json.loads((folder / "run.json").read_text(encoding="utf-8")),
-            configs.load(folder / "test.toml"),
+            configs.load(folder / "test.toml", check_files=False),
             Calibration.load(folder / "calibration.toml"),
             folder,
         )

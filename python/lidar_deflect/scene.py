@@ -317,7 +317,7 @@ def demo(seed: int = 1) -> Scene:
     The tip moves by about 7 m at 100 %.
     """
     ground = Ground()
-    lidars = _lidars(3.0, ground, 86.0, 7.8)
+    lidars = _lidars(3.0, ground, 85.2, 8.1)
     # One sensor without a time server: on since three minutes ago, its clock gaining.
     lidars[2]["clock"] = {"offset_ms": -1_219_432.1, "drift_ppm": 14.0}
     return Scene.from_document(

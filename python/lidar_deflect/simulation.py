@@ -14,7 +14,7 @@ import tomlkit
 
 from lidar_deflect import _native
 from lidar_deflect.errors import InvalidValueError
-from lidar_deflect.files import whole_folder
+from lidar_deflect.files import uninterrupted, whole_folder
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -118,7 +118,9 @@ def _write_truth(
         **{name: rows[:, i] for i, name in enumerate(TRUTH_COLUMNS)},
         "twist_deg": np.degrees(rows[:, 12]),
     }
-    pl.DataFrame(columns).sort("s_m", "time").write_parquet(folder / "truth.parquet")
+    truth = pl.DataFrame(columns).sort("s_m", "time")
+    with uninterrupted():
+        truth.write_parquet(folder / "truth.parquet")
     lidars = [
         {
             "source": lidar.address,

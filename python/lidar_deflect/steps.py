@@ -10,10 +10,13 @@ from lidar_deflect.holds import Hold
 SEEN = ("ok", "degraded")
 """Statuses of states that were measured."""
 
-TIERS = (("ok",), SEEN, ("interpolated", "extrapolated"))
-"""Statuses of the states that a hold averages: the first of these that are enough."""
+_TIERS = (("ok",), SEEN, (*SEEN, "extrapolated"), ("interpolated",))
+"""Qualities of state, from best to worst."""
 
-_ENOUGH = (0.5, 0.0, 0.0)  # share of the hold's states above which a tier is enough
+_HALF = 0.5
+_ENOUGH = (_HALF, _HALF, 0.0, 0.0)
+"""States of a quality stand for a hold when they are more than this share of it."""
+
 _COMPONENTS = (("dx_m", "dy_m", "dz_m"), ("dxr_m", "dyr_m", "dzr_m"))
 _TOTALS = ("d_m", "dr_m")
 
@@ -21,12 +24,12 @@ _TOTALS = ("d_m", "dr_m")
 def average(deflection: pl.DataFrame, holds: Sequence[Hold]) -> pl.DataFrame:
     """Average the deflection over each hold.
 
-    Where at least half of a hold's states are `ok`, those count alone; else `degraded` ones count
-    too; where a hold has neither, filled ones (`interpolated`, `extrapolated`) do and give the row
-    their status. A step of which under half of the states are `ok` is `degraded`, with the
-    commonest reason. Total deflections are the norms of the
-    averaged components. Uncertainties are averaged, not divided by the root of the count: what a
-    hold's states share does not average out.
+    Where half of a hold's states are `ok`, those count alone; else, where half are `ok` or
+    `degraded`, those; else all that come from data of their moment, `extrapolated` ones too; only
+    where there are none, `interpolated` ones. The row has the commonest status of what it averages,
+    with the commonest reason; one of which under half of the states could be used is never `ok`.
+    Total deflections are the norms of the averaged components. Uncertainties are averaged, not
+    divided by the root of the count: what a hold's states share does not average out.
 
     Parameters
     ----------
@@ -80,10 +83,10 @@ def _one(deflection: pl.DataFrame, hold: Hold, section: tuple[str, float]) -> pl
 
 def _used(rows: pl.DataFrame) -> pl.DataFrame:
     placed = rows.filter(pl.col("x_m").is_not_null())
-    for statuses, enough in zip(TIERS, _ENOUGH, strict=True):
-        tier = placed.filter(pl.col("status").cast(pl.String).is_in(statuses))
-        if tier.height and tier.height >= enough * rows.height:
-            return tier
+    for statuses, enough in zip(_TIERS, _ENOUGH, strict=True):
+        good = placed.filter(pl.col("status").cast(pl.String).is_in(statuses))
+        if good.height and good.height >= enough * rows.height:
+            return good
     return placed.clear()
 
 
@@ -106,7 +109,7 @@ def _status(rows: pl.DataFrame, used: pl.DataFrame) -> tuple[str, str | None]:
     if used.is_empty():
         return "missing", left_out
     status = _commonest(used, "status") or "missing"
-    if status == "ok" and used.height < rows.height / 2:
+    if status == "ok" and used.height < _HALF * rows.height:
         return "degraded", left_out
     return status, None if status == "ok" else _commonest(used, "reason")
 

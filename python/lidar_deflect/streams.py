@@ -26,8 +26,8 @@ class StreamInfo:
     beams
         Where the angles of the unit come from; begins with ``missing`` where there are none.
     return_mode
-        ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with its two
-        returns in parentheses.
+        ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with
+        its two returns in parentheses.
     rpm
         Turns a minute in the mean.
     packets, lost, duplicated, late, too_late, foreign
@@ -122,15 +122,19 @@ def stream(entry: dict[str, Any]) -> StreamInfo:
     return StreamInfo(**(entry | lists | {"clock": clock}))
 
 
-def no_lidar(paths: Sequence[Path], described: Mapping[str, Any]) -> CaptureError:
+def no_lidar(
+    paths: Sequence[Path],
+    described: Mapping[str, Any],
+    models: Sequence[tuple[str, str]],
+) -> CaptureError:
     """Tell that a capture holds no known lidar, and which stream comes closest to one."""
     others = described["other_streams"]
     facts = [("read", f"{_grouped(described['datagrams'])} packets in {len(others)} UDP streams")]
-    near = [stream for stream in others if stream["why_not"]] or others
     hint = "check that the sensor sends to this computer while you record"
+    near = [stream for stream in others if stream["why_not"]] or others
     if near:
-        first = near[0]
-        facts.append(("closest", _closest(first)))
+        facts.append(("closest", _closest(near[0])))
+        hint = f"sensors that are known: {', '.join(model for model, _ in models)}"
     if near and near[0]["closest_model"]:
         source, model = near[0]["source"], near[0]["closest_model"]
         hint = f"name the model: --sensor {source}={model}"

@@ -1,7 +1,5 @@
 """Files that describe single units: the ones the user names, and the ones beside a capture."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,7 +34,7 @@ def named(beams: Mapping[str, Any]) -> list[UnitFile]:
 
 
 def beside(captures: Sequence[Path]) -> list[UnitFile]:
-    """Read the files beside captures that have their name: ``tower.pcap`` and ``tower.angle.csv``."""
+    """Read the files beside captures that have their name, as ``tower.csv`` of ``tower.pcap``."""
     found: dict[Path, bytes] = {}
     for capture in captures:
         for path in _siblings(capture):

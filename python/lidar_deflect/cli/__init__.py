@@ -1,6 +1,10 @@
 """The command line: one file per command; heavy imports live inside the commands."""
 
+import os
+import signal
 import sys
+
+INTERRUPTED = 130
 
 
 def main() -> None:
@@ -11,5 +15,10 @@ def main() -> None:
         code = run(sys.argv[1:])
     except KeyboardInterrupt:  # while the command line itself was still being loaded
         sys.stderr.write("error[interrupted]: interrupted; nothing half-written is left\n")
-        code = 130
+        code = INTERRUPTED
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # nothing is left to interrupt
+    if code == INTERRUPTED:
+        # Threads of libraries may still be at work, and would abort on an interpreter that ends.
+        sys.stderr.flush()
+        os._exit(code)
     sys.exit(code)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import signal
-import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +20,7 @@ from lidar_deflect.cli import (
     simulate,
 )
 from lidar_deflect.cli.failure import show
+from lidar_deflect.cli.interrupt import INTERRUPT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,45 +77,22 @@ def _root(
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code; nothing but its result is on stdout."""
-    interrupt = _Interrupt()
+    INTERRUPT.arm()
+    try:
+        return _run(arguments)
+    finally:
+        INTERRUPT.restore()
+
+
+def _run(arguments: Sequence[str]) -> int:
     try:
         code = app(list(arguments), prog_name=PROGRAM, standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:
-        interrupt.disarm()
-        return show(KeyboardInterrupt() if interrupt.came else error, arguments)
+        INTERRUPT.disarm()
+        return show(KeyboardInterrupt() if INTERRUPT.came else error, arguments)
     except SystemExit as left:
         code = left.code
-    interrupt.disarm()
-    if interrupt.came and code:
+    INTERRUPT.disarm()
+    if INTERRUPT.came and code:
         return show(KeyboardInterrupt(), arguments)
     return int(code or 0)
-
-
-class _Interrupt:
-    """Remembers that Ctrl-C came, should a library turn the interrupt into another error."""
-
-    def __init__(self) -> None:
-        self.came = False
-        try:
-            signal.signal(signal.SIGINT, self._raise)
-        except ValueError:  # not the main thread: whoever runs us there handles signals
-            return
-        sys.unraisablehook = self._unraisable
-
-    def _raise(self, *_: object) -> None:
-        self.came = True
-        raise KeyboardInterrupt
-
-    def _unraisable(self, unraisable: Any) -> None:
-        """Let an interrupt that came inside a destructor through, instead of printing it."""
-        if unraisable.exc_type is not None and issubclass(unraisable.exc_type, KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
-        else:
-            sys.__unraisablehook__(unraisable)
-
-    def disarm(self) -> None:
-        """Ignore further interrupts: what is left takes no time."""
-        try:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
-        except ValueError:
-            return

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lidar_deflect.cli.measure import measured_steps
 from lidar_deflect.cli.options import Json, Quiet, Verbose
 from lidar_deflect.cli.talk import Talk
 
@@ -42,7 +43,24 @@ def compare(
 
     taken = comparison.recognise(against, kind=kind)
     talk.note(f"{against}: taken as {taken.kind} ({taken.why})")
+    if taken.kind != "run":
+        refuse_unloaded(results)
     frame = comparison.compare(results, taken)
     comparison.save(results, frame)
     document = {"schema": SCHEMA, "rows": frame.to_dicts()}
     talk.result(document, comparison.table2(frame))
+
+
+def refuse_unloaded(results: Path) -> None:
+    """Refuse a run without a loaded hold: of nothing but noise there is no error in percent."""
+    from lidar_deflect.errors import MeasurementError
+    from lidar_deflect.folder import Folder
+
+    steps = measured_steps(Folder(results).steps)
+    if all(step.startswith("0 %") for step in steps):
+        raise MeasurementError(
+            f"{results} has no loaded hold",
+            code="comparison.not_loaded",
+            facts=[("steps", ", ".join(steps) or "none")],
+            hint="measure a capture in which the blade is held under load",
+        )

@@ -1,7 +1,7 @@
 """``lidar-deflect demo``: the whole road on simulated data, held against the truth."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from lidar_deflect.cli.measure import verdict
 from lidar_deflect.cli.options import Json, Overwrite, Quiet, Threads, Timings, Verbose, free
 from lidar_deflect.cli.talk import Talk, table
 
@@ -28,7 +29,7 @@ def demo(
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
-) -> None:
+) -> int:
     """Simulate a test, measure it, compare with its truth.
 
     A four-lidar edgewise test; needs no data. Leaves the simulated capture, the result tables
@@ -37,10 +38,11 @@ def demo(
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     free(out, overwrite)
     with _removed_on_failure(out):
-        document, text, seconds = _run(out, talk, threads)
+        document, text, seconds, code = _run(out, talk, threads)
     talk.result(document, text)
     talk.note(f"\nreport: {document['report']}")
     talk.timings(timings, seconds)
+    return code
 
 
 @contextmanager
@@ -57,7 +59,7 @@ def _removed_on_failure(folder: Path) -> Iterator[None]:
 
 def _run(
     out: Path, talk: Talk, threads: int | None
-) -> tuple[dict[str, Any], str, dict[str, float]]:
+) -> tuple[dict[str, Any], str, dict[str, float], int]:
     from lidar_deflect import comparison, scene, simulation
     from lidar_deflect import report as reports
     from lidar_deflect.pipeline import Test
@@ -87,17 +89,19 @@ def _run(
     watch.lap("compare")
     report = reports.write(results)
     watch.lap("report")
-    rows = against_truth(compared)
+    code = verdict(result, talk)
+    rows = against_truth(compared, result.steps)
     document = {
         "schema": SCHEMA,
         "folder": str(out),
         "report": str(report),
         "method": test.config.measure.method,
         "rows": rows,
-        "largest_error_m": largest_error(rows),
+        "largest_error": largest_error(rows),
+        "largest_error_across": largest_error(rows, ACROSS),
         "seconds": watch.seconds,
     }
-    return document, _text(rows, str(test.config.measure.method)), watch.seconds
+    return document, _text(rows, str(test.config.measure.method)), watch.seconds, code
 
 
 class _Watch:
@@ -113,23 +117,36 @@ class _Watch:
         self._last = now
 
 
-def against_truth(compared: "pl.DataFrame") -> list[dict[str, Any]]:
+def against_truth(compared: "pl.DataFrame", steps: "pl.DataFrame") -> list[dict[str, Any]]:
     """Set measured and true change of every section side by side, at the largest load step."""
     from lidar_deflect import comparison
 
     step = comparison.largest_step(compared)
+    status = {row["section"]: row["status"] for row in steps.to_dicts() if row["step"] == step}
     rows: dict[str, dict[str, Any]] = {}
     for row in compared.to_dicts():
         if row["step"] == step and row["source"] == "truth":
             entry = rows.setdefault(
-                row["section"], {"section": row["section"], "s_m": row["s_m"], "step": step}
+                row["section"],
+                {
+                    "section": row["section"],
+                    "s_m": row["s_m"],
+                    "step": step,
+                    "status": status[row["section"]],
+                },
             )
             entry[f"{row['quantity']}_m"] = row["measured_m"]
             entry[f"{row['quantity']}_true_m"] = row["reference_m"]
     return sorted(rows.values(), key=lambda entry: float(entry["s_m"]))
 
 
-def largest_error(rows: list[dict[str, Any]]) -> dict[str, Any] | None:
+ACROSS = ("dx", "dy")
+COMPONENTS = (*ACROSS, "dz")
+
+
+def largest_error(
+    rows: list[dict[str, Any]], components: Sequence[str] = COMPONENTS
+) -> dict[str, Any] | None:
     """Return the component that is farthest from the truth: section, quantity, error in metres."""
     errors = [
         {
@@ -138,7 +155,7 @@ def largest_error(rows: list[dict[str, Any]]) -> dict[str, Any] | None:
             "error_m": row[f"{quantity}_m"] - row[f"{quantity}_true_m"],
         }
         for row in rows
-        for quantity in ("dx", "dy", "dz")
+        for quantity in components
         if row.get(f"{quantity}_m") is not None
     ]
     return max(errors, key=lambda error: abs(error["error_m"]), default=None)
@@ -150,17 +167,18 @@ QUANTITIES = (("dx", "x"), ("dy", "y"), ("dz", "z"), ("total", "total"))
 def _text(rows: list[dict[str, Any]], method: str) -> str:
     if not rows:
         return "no section was measured at the largest load step"
-    header = ["section", "", *(f"{word} (m)" for _, word in QUANTITIES)]
+    header = ["section", "", *(f"{word} (m)" for _, word in QUANTITIES), "status"]
     lines = [line for row in rows for line in _lines(row)]
     head = f"change of coordinates at {rows[0]['step']}, method {method}, simulated data\n"
-    worst = largest_error(rows)
-    tail = (
-        f"\n\nlargest error: {abs(worst['error_m']):.3f} m, in {worst['quantity'][1:]} of "
-        f"{worst['section']}"
-        if worst
-        else ""
-    )
+    worst, across = largest_error(rows), largest_error(rows, ACROSS)
+    tail = f"\n\nlargest error: {_error(worst)}; across the blade: {_error(across)}"
     return head + table(header, lines) + tail
+
+
+def _error(error: dict[str, Any] | None) -> str:
+    if error is None:
+        return "-"
+    return f"{abs(error['error_m']):.3f} m, in {error['quantity'][1:]} of {error['section']}"
 
 
 def _lines(row: dict[str, Any]) -> Iterator[list[str]]:
@@ -172,7 +190,9 @@ def _lines(row: dict[str, Any]) -> Iterator[list[str]]:
     ]
     name = str(row["section"])
     for word, values in (("measured", measured), ("true", true), ("error", errors)):
-        yield [name if word == "measured" else "", word, *map(_metres, values)]
+        first = word == "measured"
+        ends = (name, str(row["status"])) if first else ("", "")
+        yield [ends[0], word, *map(_metres, values), ends[1]]
 
 
 def _metres(value: float | None) -> str:

@@ -29,6 +29,8 @@ from lidar_deflect.cli.talk import Talk
 from lidar_deflect.cli.units import narrowed, overrides
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from lidar_deflect.result import Result
 
 SCHEMA = "lidar-deflect.measure/1"
@@ -104,6 +106,13 @@ def verdict(result: "Result", talk: Talk) -> int:
     """Pass on what a reader of the result should know; return the exit code of a finished run."""
     for warning in result.run["warnings"]:
         talk.warn(warning)
+    if all(step.startswith("0 %") for step in measured_steps(result.steps)):
+        talk.warn("no loaded hold was found: there is no deflection but noise")
     for gate in result.failed_gates:
         talk.warn(f"quality gate: {gate}")
     return QUALITY if result.failed_gates else 0
+
+
+def measured_steps(steps: "pl.DataFrame") -> list[str]:
+    """Return the load steps in which at least one section was measured."""
+    return sorted({row["step"] for row in steps.to_dicts() if row["d_m"] is not None})

@@ -13,6 +13,8 @@ from datetime import date, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lidar_deflect.cli.interrupt import INTERRUPT
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -85,13 +87,20 @@ class Talk:
 
 
 class Progress:
-    """The callbacks that long calls take; this one shows nothing."""
+    """The callbacks that long calls take; this one shows nothing, and lets Ctrl-C through."""
 
     def amount(self, done: int, total: int) -> None:
         """Take progress in bytes."""
+        INTERRUPT.check()
+        self._show(None, done, total)
 
     def stage(self, stage: str, done: int, total: int) -> None:
         """Take progress of a named stage."""
+        INTERRUPT.check()
+        self._show(stage, done, total)
+
+    def _show(self, stage: str | None, done: int, total: int) -> None:
+        """Show it, where somebody sees it."""
 
 
 class _Bar(Progress):
@@ -114,11 +123,10 @@ class _Bar(Progress):
         self._task = self._bar.add_task(label, total=None)
         self._bar.start()
 
-    def amount(self, done: int, total: int) -> None:
-        self.stage(self._label, done, total)
-
-    def stage(self, stage: str, done: int, total: int) -> None:
-        self._bar.update(self._task, description=stage, completed=done, total=total or None)
+    def _show(self, stage: str | None, done: int, total: int) -> None:
+        self._bar.update(
+            self._task, description=stage or self._label, completed=done, total=total or None
+        )
 
     def stop(self) -> None:
         self._bar.stop()

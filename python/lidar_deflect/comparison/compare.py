@@ -14,7 +14,7 @@ from lidar_deflect.comparison.error import NEGLIGIBLE, error_percent
 from lidar_deflect.comparison.measured import AXES, Measured
 from lidar_deflect.comparison.reference import Reference, Wire, prediction, recognise, wires
 from lidar_deflect.errors import ResultError
-from lidar_deflect.results import Folder
+from lidar_deflect.folder import Folder
 
 Row = dict[str, Any]
 

@@ -6,6 +6,7 @@ Rust, in blocks of frames. Steps 1 to 4 are `lidar_deflect.registration`.
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,12 @@ from lidar_deflect.measurement.plan import Plan, make_plan
 from lidar_deflect.measurement.plane import choose_plane
 from lidar_deflect.measurement.reference import Reference, reference_of
 from lidar_deflect.measurement.states import MISSING, States
-from lidar_deflect.measurement.status import extrapolate, grade_frames, interpolate
+from lidar_deflect.measurement.status import (
+    extrapolate,
+    grade_frames,
+    interpolate,
+    refuse_stretched,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -57,7 +63,7 @@ def measure(inputs: Inputs) -> States:
         contour=_blade_line(inputs, contours, reference),
         points=contours.points(inputs.lidars),
         rejected=contours.rejected(),
-        evidence=_evidence(plan, contours, reference),
+        evidence=_evidence(plan, contours, reference, reason[status == MISSING]),
         warnings=(*plan.warnings, *plane_warnings),
     )
 
@@ -87,6 +93,7 @@ def sections_over_time(
     status = np.repeat(status[:, None], count, axis=1)
     reason = np.repeat(reason[:, None], count, axis=1)
     position[status == MISSING] = np.nan
+    refuse_stretched(status, reason, position, reference.s_m)
     extrapolate(status, reason, position[:, :, 2], contours.seen_z_m)
     if inputs.config.paper.overhead == "interpolate":
         interpolate(contours.time_ns, position, status, reason)
@@ -133,12 +140,15 @@ def _blade_line(inputs: Inputs, contours: ContourRun, reference: Reference) -> M
     }
 
 
-def _evidence(plan: Plan, contours: ContourRun, reference: Reference) -> Mapping[str, Any]:
+def _evidence(
+    plan: Plan, contours: ContourRun, reference: Reference, refused: NDArray[np.object_]
+) -> Mapping[str, Any]:
     failures = [name for name in contours.failures(reference.plane) if name is not None]
     return {
         "plan": plan.to_dict(),
         "plane": reference.plane,
         "reference": reference.to_dict(),
         "frames": len(contours.time_ns),
-        "refused_frames": {name: failures.count(name) for name in sorted(set(failures))},
+        "refused_frames": dict(sorted(Counter(failures).items())),
+        "missing_states": dict(sorted(Counter(refused.tolist()).items())),
     }

@@ -105,7 +105,7 @@ def make_plan(config: Config, calibration: Calibration, clouds: Mapping[str, Hol
             lidar: _azimuth_below(cloud, calibration.pose(lidar).world_from_sensor)
             for lidar, cloud in clouds.items()
         },
-        edge_on_above=abs(float(leading_edge @ UP)) > np.sqrt(0.5),
+        edge_on_above=bool(abs(leading_edge @ UP) > np.sqrt(0.5)),
         warnings=warnings,
     )
 

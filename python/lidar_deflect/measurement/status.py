@@ -28,6 +28,10 @@ BEYOND_M = 1.0
 """A section farther than this from the scan lines on the blade is `extrapolated`."""
 
 
+STRETCH = 0.02
+"""A section farther from the root than its arc length by this share of it is impossible."""
+
+
 @dataclass(frozen=True)
 class Uses:
     """What became of each lidar's points, all of shape (t, lidars).
@@ -102,6 +106,26 @@ def extrapolate(
     status[before | beyond] = EXTRAPOLATED
     reason[before] = "before_first_line"
     reason[beyond] = "beyond_last_line"
+
+
+def refuse_stretched(
+    status: NDArray[np.uint8], reason: NDArray[np.object_], position_m: Floats, s_m: Floats
+) -> None:
+    """Refuse sections that only a stretched blade could reach, in place.
+
+    The root is the origin, and no point of a blade is farther from it than its arc length.
+
+    Parameters
+    ----------
+    status, reason, position_m
+        Shapes (t, s), (t, s), (t, s, 3).
+    s_m
+        Arc lengths of the sections, shape (s,).
+    """
+    stretched = np.linalg.norm(position_m, axis=2) > (1.0 + STRETCH) * s_m
+    status[stretched] = MISSING
+    reason[stretched] = "stretched"
+    position_m[stretched] = np.nan
 
 
 def interpolate(

@@ -13,9 +13,9 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from lidar_deflect.files import write_text
+from lidar_deflect.folder import Folder
 from lidar_deflect.report import content, made_of, words
 from lidar_deflect.report.figures import Figures
-from lidar_deflect.results import Folder
 
 __all__ = ["render", "write"]
 

@@ -6,8 +6,8 @@ from typing import Any
 import polars as pl
 
 from lidar_deflect import comparison
+from lidar_deflect.folder import Folder
 from lidar_deflect.report import digits, words
-from lidar_deflect.results import Folder
 from lidar_deflect.steps import SEEN
 
 Cells = list[str]

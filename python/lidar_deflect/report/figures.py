@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import plotly.graph_objects as go
 from markupsafe import Markup
 
+from lidar_deflect.folder import Folder
 from lidar_deflect.plots import Plots
 from lidar_deflect.plots.source import sections
 from lidar_deflect.report import words
-from lidar_deflect.results import Folder
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from typing import Any
 
 import polars as pl
 
+from lidar_deflect.folder import Folder
 from lidar_deflect.report import digits, words
-from lidar_deflect.results import Folder
 
 Cells = list[str]
 

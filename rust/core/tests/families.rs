@@ -1,53 +1,19 @@
-//! Does every Velodyne and Hesai model give back what was written into its packets, count what is
-//! missing, and survive any bytes?
+//! Does every Velodyne and Hesai model give back what was written into its packets, and survive any
+//! bytes?
 
 #[path = "support/families.rs"]
 mod families;
 
-use std::net::SocketAddr;
-
-use families::{Writer, blocks, unit_files, writers};
-use lidar_deflect_core::capture::Datagram;
+use families::{Writer, packet, unit_files, writers};
 use lidar_deflect_core::cloud::{Return, ReturnKind};
 use lidar_deflect_core::packet::echoes::RawEcho;
-use lidar_deflect_core::packet::hesai::layout::RawPacket;
-use lidar_deflect_core::packet::{Decoded, MODELS, PacketKind, Place, ReturnMode, claimants};
-use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport};
+use lidar_deflect_core::packet::{Decoded, MODELS, Place, ReturnMode, claimants};
 use lidar_deflect_core::time::Timestamp;
 use proptest::prelude::*;
-use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const MUTATIONS: usize = 100_000;
-/// 2024-06-10 06:13:20.5 UTC.
-const START: Timestamp = Timestamp(1_718_000_000_500_000_000);
-/// Hundredths of a degree from one firing to the next.
-const STEP: u16 = 20;
-
-/// A packet with an echo wherever `echo` says so.
-fn packet(
-    writer: &Writer,
-    mode: ReturnMode,
-    number: u32,
-    echo: impl Fn(usize, usize) -> RawEcho,
-) -> RawPacket {
-    let firings = (writer.size.0 / mode.returns()) as u32;
-    let azimuth = |firing: usize| match writer.model.id() {
-        "ft120" => (number % 160) as u16,
-        _ => ((number * firings + firing as u32) * u32::from(STEP) % 36_000) as u16,
-    };
-    let period_ns = writer.model.period_ns(mode);
-    RawPacket {
-        time: START + i64::from(number) * period_ns / 1000 * 1000,
-        sequence: number.wrapping_add(u32::MAX - 40),
-        return_mode: mode,
-        rpm: 600.0,
-        operation: 0,
-        azimuth_state: 0,
-        blocks: blocks(writer.size, mode, azimuth, echo),
-    }
-}
 
 fn decode(writer: &Writer, payload: &[u8], out: &mut Decoded) {
     let head = writer.model.head(payload).unwrap();
@@ -112,7 +78,7 @@ fn check(writer: &Writer, mode: ReturnMode, number: u32, echoes: &[RawEcho]) {
     let (blocks, channels) = writer.size;
     let echo = |block: usize, channel: usize| {
         // Two of three second returns differ from the first.
-        let block = if channel % 3 == 0 {
+        let block = if channel.is_multiple_of(3) {
             block / mode.returns() * mode.returns()
         } else {
             block
@@ -193,7 +159,7 @@ fn the_meaning_of_two_returns_does_not_depend_on_their_order() {
     {
         for is_far_first in [true, false] {
             let echo = |block: usize, _| RawEcho {
-                range: if (block % 2 == 0) == is_far_first {
+                range: if block.is_multiple_of(2) == is_far_first {
                     9_000
                 } else {
                     4_000
@@ -350,136 +316,4 @@ fn changed_bytes_of_velodyne_are_survived() {
 #[test]
 fn changed_bytes_of_hesai_are_survived() {
     survive("hesai", 2);
-}
-
-/// Sends packets as `order` says; each arrives when it is complete.
-fn scan(writer: &Writer, mode: ReturnMode, order: &[u32]) -> ScanReport {
-    let source: SocketAddr = "192.168.1.201:10000".parse().unwrap();
-    let destination: SocketAddr = "192.168.1.100:2368".parse().unwrap();
-    let period_ns = writer.model.period_ns(mode);
-    let mut scan = Scan::new(ScanOptions::default());
-    let echo = |_, _| RawEcho {
-        range: 2_500,
-        intensity: 9,
-    };
-    let mut arrival = START;
-    for (record, number) in (0..).zip(order) {
-        let sent = packet(writer, mode, *number, echo);
-        arrival = (sent.time + period_ns + 100_000).max(arrival + 1);
-        let payload = (writer.encode)(&sent);
-        scan.push(&Datagram {
-            time: arrival,
-            source,
-            destination,
-            payload: &payload,
-            record,
-            offset: 0,
-        });
-    }
-    scan.finish()
-}
-
-#[test]
-fn numbered_packets_that_are_lost_repeated_or_late_are_counted_exactly() {
-    let numbered = |writer: &Writer| writer.model.counting().sequence_bits.is_some();
-    for writer in writers().iter().filter(|writer| numbered(writer)) {
-        let mut random = ChaCha8Rng::seed_from_u64(5);
-        let mut numbers: Vec<u32> = (1..1500).collect();
-        numbers[1..].shuffle(&mut random);
-        // Far enough apart that one does not touch another, none at an end.
-        let mut chosen: Vec<u32> = numbers
-            .into_iter()
-            .filter(|n| n % 9 == 4 && *n > 60 && *n < 1450)
-            .collect();
-        let lost: Vec<u32> = chosen.split_off(chosen.len() - 40);
-        let repeated: Vec<u32> = chosen.split_off(chosen.len() - 30);
-        let late: Vec<u32> = chosen.split_off(chosen.len() - 20);
-        let mut order = Vec::new();
-        for number in (1..1500).filter(|n| !lost.contains(n) && !late.contains(n)) {
-            order.push(number);
-            order.extend(repeated.contains(&number).then_some(number));
-            order.extend(number.checked_sub(2).filter(|before| late.contains(before)));
-        }
-        let report = scan(writer, writer.modes[0], &order);
-        let id = writer.model.id();
-        assert_eq!(report.lidars.len(), 1, "{id}: {:?}", report.others);
-        let info = &report.lidars[0];
-        assert_eq!(info.model.id(), id);
-        let counts = info.counts;
-        let found = (
-            counts.packets,
-            counts.lost,
-            counts.duplicated,
-            counts.late,
-            counts.too_late,
-        );
-        assert_eq!(found, (1499 - 40, 40, 30, 20, 0), "{id}");
-        assert_eq!(info.clock.segments().len(), 1, "{id}");
-    }
-}
-
-#[test]
-fn every_model_is_named_from_its_packets_alone() {
-    for writer in writers() {
-        for mode in writer.modes {
-            let order: Vec<u32> = (0..200).collect();
-            let report = scan(&writer, *mode, &order);
-            let [info] = &report.lidars[..] else {
-                panic!("{}: {:?}", writer.model.id(), report.others)
-            };
-            assert_eq!(info.model.id(), writer.model.id());
-            assert_eq!(info.return_mode, mode.name());
-            assert_eq!(
-                (info.counts.packets, info.counts.lost),
-                (200, 0),
-                "{}",
-                info.model.id()
-            );
-        }
-    }
-}
-
-#[test]
-fn an_hdl64e_without_a_calibration_is_refused_and_says_how_to_get_one() {
-    let writer = writers()
-        .into_iter()
-        .find(|w| w.model.id() == "hdl64e-s3")
-        .unwrap();
-    let report = scan(
-        &writer,
-        ReturnMode::Strongest,
-        &(0..200).collect::<Vec<_>>(),
-    );
-    let error = report.lidars[0].calibration.clone().unwrap_err();
-    assert!(
-        error.to_string().contains("calibration of the unit"),
-        "{error}"
-    );
-    assert_eq!(
-        writer
-            .model
-            .recognise(&sample(&writer, ReturnMode::Strongest)),
-        Some(PacketKind::Data)
-    );
-}
-
-#[test]
-fn too_few_packets_leave_two_models_open() {
-    let writer = writers()
-        .into_iter()
-        .find(|w| w.model.id() == "hdl32e")
-        .unwrap();
-    let report = scan(&writer, ReturnMode::Strongest, &[1, 2]);
-    let info = &report.lidars[0];
-    let mut named = vec![info.model.id()];
-    named.extend(&info.candidates);
-    assert!(
-        named.contains(&"hdl32e") && named.contains(&"vlp16"),
-        "{named:?}"
-    );
-    assert!(
-        info.notes
-            .iter()
-            .any(|note| note.contains("too few packets"))
-    );
 }

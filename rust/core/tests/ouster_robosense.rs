@@ -12,7 +12,7 @@ use lidar_deflect_core::packet::robosense::rotating::{Family, Rotating};
 use lidar_deflect_core::packet::robosense::{airy, bpearl, difop, helios, layout, rs, ruby};
 use lidar_deflect_core::packet::unit::UnitFile;
 use lidar_deflect_core::packet::{
-    Decoded, Decoder, ModelRef, PacketKind, Place, model, unit_models,
+    Decoded, Decoder, Model, ModelRef, PacketKind, Place, model, unit_models,
 };
 use lidar_deflect_core::stream::{Given, Scan, ScanOptions, ScanReport};
 use lidar_deflect_core::time::Timestamp;
@@ -27,14 +27,17 @@ const START_NS: i64 = 1_718_000_000_500_000_000;
 /// Range in units and brightness of an echo, by block or column, channel and return.
 type Echo<'a> = &'a dyn Fn(usize, usize, usize) -> (u32, u8);
 
+/// Writes the packet with a number, of so many returns, with echoes.
+type Encode = Box<dyn Fn(u32, usize, Echo<'_>) -> Vec<u8>>;
+
 /// A model with what writes its packets.
 struct Writer {
     model: ModelRef,
     files: Vec<UnitFile>,
     /// Metres of one unit.
     unit_m: f64,
-    /// Number of the packet, returns of a shot, echoes.
-    encode: Box<dyn Fn(u32, usize, Echo<'_>) -> Vec<u8>>,
+    /// Writes its packets.
+    encode: Encode,
     /// Returns of a shot that it can write.
     returns: &'static [usize],
     period_ns: i64,
@@ -139,7 +142,6 @@ fn robosense<F: Family>(
     files: Vec<UnitFile>,
     unit_m: f64,
 ) -> Writer {
-    use lidar_deflect_core::packet::Model;
     let header = header.to_vec();
     let layout = rotating.0.layout();
     let is_half = rotating.0.lasers() == 16;
@@ -340,16 +342,16 @@ fn check(writer: &Writer, returns: usize, number: u32, at: Echo<'_>) {
         // A firing of which the next packet has the second return counts half.
         let is_shared = id.starts_with("ruby") && returns == 2;
         let most_ns = head.duration_ns + i64::from(is_shared) * 56_000;
-        assert!((0..=most_ns).contains(&since_ns), "{id}: {since_ns} of {most_ns}");
+        assert!(
+            (0..=most_ns).contains(&since_ns),
+            "{id}: {since_ns} of {most_ns}"
+        );
     }
 }
 
 /// Everything that may be asked of a payload.
 fn ask_everything(writer: &Writer, decoder: &mut dyn Decoder, payload: &[u8], out: &mut Decoded) {
-    for model in [
-        writer.model,
-        model("ouster").unwrap(),
-    ] {
+    for model in [writer.model, model("ouster").unwrap()] {
         let _ = (
             model.recognise(payload),
             model.fits(payload),
@@ -635,7 +637,6 @@ fn an_older_helios_is_told_by_what_its_halves_see() {
             .map(|number| (writer.encode)(number, 1, &echo))
             .collect();
         let payloads: Vec<&[u8]> = packets.iter().map(Vec::as_slice).collect();
-        use lidar_deflect_core::packet::Model;
         assert_eq!(helios::HELIOS_16P.suits(&payloads), is_half);
         assert_eq!(helios::HELIOS_32.suits(&payloads), !is_half);
         assert!(!helios::HELIOS_32_26DEG.suits(&payloads));

@@ -7,7 +7,7 @@ use lidar_deflect_core::packet::velodyne::position::Position;
 use lidar_deflect_core::packet::velodyne::puck::{
     PRODUCT_HIRES, PRODUCT_VLP16, VLP16, VLP16_HIRES,
 };
-use lidar_deflect_core::packet::velodyne::{BLOCKS, RawBlock, RawReturn, encode};
+use lidar_deflect_core::packet::velodyne::{RawBlock, RawReturn, encode};
 use lidar_deflect_core::packet::{
     Decoded, MODELS, ModelRef, Place, ReturnMode, closest, companion, model,
 };
@@ -115,7 +115,7 @@ fn a_stream_of_noise_is_survived_and_counted() {
         match random.random_range(0..10) {
             0 => random.fill_bytes(&mut packet.payload[1200..1204]),
             1 => {
-                packet.arrival_ns = i64::from(random.random::<i32>()) << random.random_range(0..32)
+                packet.arrival_ns = i64::from(random.random::<i32>()) << random.random_range(0..32);
             }
             2 => random.fill_bytes(&mut packet.payload[..1200]),
             3 => {
@@ -180,8 +180,8 @@ proptest! {
         model.fit(&[]).unwrap().decoder.decode(&payload, place, &mut out);
         let beams = if is_hires { VLP16_HIRES.beams() } else { VLP16.beams() };
         let mut returns = out.returns.iter();
-        for number in 0..BLOCKS {
-            for (channel, echo) in blocks[number].returns.iter().enumerate() {
+        for (number, block) in blocks.iter().enumerate() {
+            for (channel, echo) in block.returns.iter().enumerate() {
                 if echo.range == 0 {
                     continue;
                 }

@@ -7,7 +7,9 @@ mod source;
 
 mod member;
 mod set;
+mod tail;
 
 pub use error::{FileError, Foreign};
 pub use member::FileFacts;
 pub use set::CaptureSet;
+pub use tail::tail;

@@ -11,6 +11,30 @@ use pyo3::prelude::*;
 use crate::error::BorderResult;
 use lidar_deflect_core::error::InvalidValue;
 
+/// A cloud as it comes: positions as stored or as computed.
+#[derive(pyo3::FromPyObject)]
+pub enum Cloud<'py> {
+    Narrow(PyReadonlyArray2<'py, f32>),
+    Wide(PyReadonlyArray2<'py, f64>),
+}
+
+/// Runs `$work` on the points of a [`Cloud`], whichever their type.
+macro_rules! with_points {
+    ($cloud:expr, |$points:ident| $work:expr) => {
+        match $cloud {
+            $crate::arrays::Cloud::Narrow(array) => {
+                let $points = $crate::arrays::points("xyz", array)?;
+                $work
+            }
+            $crate::arrays::Cloud::Wide(array) => {
+                let $points = $crate::arrays::points("xyz", array)?;
+                $work
+            }
+        }
+    };
+}
+pub(crate) use with_points;
+
 /// Borrows an (n, 3) array in C order as points, without a copy.
 pub fn points<'a, T: numpy::Element>(
     name: &'static str,

@@ -66,26 +66,14 @@ impl CaptureScan {
 /// name, content, and whether the user named it; `progress` is called with bytes done and total.
 #[pyfunction]
 #[pyo3(signature = (paths, *, sensors, units, progress=None))]
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 fn scan_capture(
     py: Python<'_>,
     paths: Vec<PathBuf>,
     sensors: Vec<(String, String)>,
-    units: Vec<(Option<String>, String, Vec<u8>, bool)>,
+    units: Vec<UnitEntry>,
     progress: Option<Py<PyAny>>,
 ) -> BorderResult<CaptureScan> {
-    let mut options = ScanOptions::default();
-    for (source, id) in &sensors {
-        let named = (Source::parse(source)?, packet::model(id)?);
-        options.models.push(named);
-    }
-    for (source, name, content, is_named) in units {
-        options.units.push(Given {
-            source: source.as_deref().map(Source::parse).transpose()?,
-            file: UnitFile::new(name, content),
-            is_named,
-        });
-    }
+    let options = options(&sensors, units)?;
     let (mut report, mut files) = scan_once(py, &paths, options, progress.as_ref())?;
     if let Some(options) = report.split() {
         (report, files) = scan_once(py, &paths, options, progress.as_ref())?;
@@ -98,6 +86,25 @@ fn scan_capture(
         report: Arc::new(report),
         files,
     })
+}
+
+/// Source or none, name, content, and whether the user named the file.
+type UnitEntry = (Option<String>, String, Vec<u8>, bool);
+
+fn options(sensors: &[(String, String)], units: Vec<UnitEntry>) -> BorderResult<ScanOptions> {
+    let mut options = ScanOptions::default();
+    for (source, id) in sensors {
+        let named = (Source::parse(source)?, packet::model(id)?);
+        options.models.push(named);
+    }
+    for (source, name, content, is_named) in units {
+        options.units.push(Given {
+            source: source.as_deref().map(Source::parse).transpose()?,
+            file: UnitFile::new(name, content),
+            is_named,
+        });
+    }
+    Ok(options)
 }
 
 fn scan_once(
@@ -116,9 +123,45 @@ fn scan_once(
     Ok((report, feed.report()))
 }
 
+/// Reads `head_s` seconds of a capture and its last records.
+///
+/// What is counted is of the head; the second value gives the end of the last packet of each lidar
+/// that is seen in the tail, by name, UTC in nanoseconds.
+#[pyfunction]
+#[pyo3(signature = (paths, *, sensors, units, head_s))]
+#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
+fn scan_quickly(
+    py: Python<'_>,
+    paths: Vec<PathBuf>,
+    sensors: Vec<(String, String)>,
+    units: Vec<UnitEntry>,
+    head_s: f64,
+) -> BorderResult<(CaptureScan, Vec<(String, i64)>)> {
+    let options = options(&sensors, units)?;
+    let mut feed = Feed::open(py, &paths)?;
+    let mut scan = Scan::new(options.clone());
+    let mut first = None;
+    while feed.block(py, None, |datagram| {
+        scan.push(datagram);
+        let first = *first.get_or_insert(datagram.time);
+        if datagram.time.seconds_since(first) > head_s {
+            feed::Want::Stop
+        } else {
+            feed::Want::More
+        }
+    })? {}
+    let report = scan.finish();
+    let ends = py.detach(|| feed::ends(&paths, &options));
+    let scan = CaptureScan {
+        paths,
+        report: Arc::new(report),
+        files: feed.report(),
+    };
+    Ok((scan, ends))
+}
+
 /// Looks at the first bytes of all files, so that what is no capture is told at once.
 #[pyfunction]
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 fn check_captures(py: Python<'_>, paths: Vec<PathBuf>) -> BorderResult<()> {
     Feed::open(py, &paths).map(|_| ())
 }
@@ -130,6 +173,20 @@ fn sensor_models() -> Vec<(&'static str, &'static str)> {
     models.map(|model| (model.id(), model.title())).collect()
 }
 
+/// What is decoded of each model and how that was proven: id, name, how it is recognised, returns,
+/// files of a unit, proof.
+#[pyfunction]
+fn sensor_table() -> Vec<[String; 6]> {
+    let rows = packet::proof::ROWS.iter();
+    rows.map(|row| {
+        let title = packet::model(row.id).map_or(row.id, |model| model.title());
+        let texts = [row.id, title, row.recognised, row.returns, row.unit];
+        let [id, title, recognised, returns, unit] = texts.map(str::to_owned);
+        [id, title, recognised, returns, unit, row.proof.describe()]
+    })
+    .collect()
+}
+
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<CaptureScan>()?;
     module.add_class::<sweeps::Sweep>()?;
@@ -137,6 +194,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<points::PointIterator>()?;
     module.add_function(wrap_pyfunction!(cut::cut_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
+    module.add_function(wrap_pyfunction!(sensor_table, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_models, module)?)
 }

@@ -1,6 +1,9 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
-use lidar_deflect_core::error::{CaptureError, Coded, InvalidValue, ReadError, UnitError};
+use lidar_deflect_core::error::{
+    CaptureError, ClusterError, Coded, FitError, InvalidValue, ReadError, UnitError,
+};
+use lidar_deflect_core::paper::tip::NoTip;
 use lidar_deflect_core::register::wall::WallError;
 use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
@@ -45,9 +48,12 @@ macro_rules! translate {
 
 translate! {
     CaptureError => "CaptureError",
+    ClusterError => "InvalidValueError",
+    FitError => "MeasurementError",
     InvalidValue => "InvalidValueError",
     ReadError => "InvalidValueError",
     UnitError => "InvalidValueError",
+    NoTip => "MeasurementError",
     WallError => "CalibrationError",
 }
 

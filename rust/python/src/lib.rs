@@ -3,10 +3,15 @@
 //! A binding function borrows, computes without the interpreter lock, and hands over; it holds no
 //! loop over points and no formula.
 
+// Python hands over values, not borrows.
+#![allow(clippy::needless_pass_by_value)]
+
 mod arrays;
 mod capture;
+mod cluster;
 mod compute;
 mod error;
+mod fit;
 mod paper;
 mod register;
 mod synthetic;
@@ -17,6 +22,8 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     capture::register(module)?;
+    cluster::register(module)?;
+    fit::register(module)?;
     paper::register(module)?;
     register::register(module)?;
     synthetic::register(module)?;

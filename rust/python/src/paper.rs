@@ -2,6 +2,7 @@
 
 mod feed;
 mod params;
+mod steps;
 
 use lidar_deflect_core::error::InvalidValue;
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
@@ -21,7 +22,8 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<FramePlan>()?;
     module.add_class::<FrameParams>()?;
     module.add_class::<DistancePass>()?;
-    module.add_class::<ContourPass>()
+    module.add_class::<ContourPass>()?;
+    steps::register(module)
 }
 
 /// First pass: how far the blade is from each lidar over the whole test.
@@ -174,7 +176,7 @@ impl ContourPass {
         Ok(arrays::table(py, lengths, places.len())?)
     }
 
-    /// Points so far before the tip, (t, len(to_tip), 3), metres.
+    /// Points so far before the tip, `(t, len(to_tip), 3)`, metres.
     fn sections_m<'py>(
         &self,
         py: Python<'py>,

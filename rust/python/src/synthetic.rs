@@ -12,8 +12,8 @@ use lidar_deflect_core::synthetic::echo::Optics;
 use lidar_deflect_core::synthetic::lidar::{self, Clock, LidarPlan};
 use lidar_deflect_core::synthetic::motion::{Schedule, Sway};
 use lidar_deflect_core::synthetic::network::NetworkPlan;
+use lidar_deflect_core::synthetic::plan::{self, SaddlePlan};
 use lidar_deflect_core::synthetic::reference::{self, Stations};
-use lidar_deflect_core::synthetic::simulation::{self, SaddlePlan};
 use lidar_deflect_core::synthetic::terrain::{Crate, GroundPlan, Wall};
 use lidar_deflect_core::synthetic::truth::SectionTruth;
 use lidar_deflect_core::synthetic::{ScenePlan, Simulation};
@@ -50,7 +50,6 @@ struct PySimulation {
     writer: Option<PcapWriter<BufWriter<File>>>,
 }
 
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 #[pymethods]
 impl PySimulation {
     /// Builds and bends the blade of a scene given as nested dictionaries in SI units.
@@ -410,7 +409,7 @@ impl LidarIn {
             address: self.address,
             port: self.port,
             position_m: self.position_m.into(),
-            axes: simulation::axes(self.axes.map(Vector3::from))?,
+            axes: plan::axes(self.axes.map(Vector3::from))?,
             tilt_rad: self.tilt_rad,
             rpm: self.rpm,
             clock: Clock {

@@ -29,10 +29,10 @@ impl Components {
         }
     }
 
-    /// Whether both are known to be in one component.
+    /// Whether `member` is known to be in the component of `root`; mostly one look.
     #[inline]
-    pub fn are_joined(&self, a: u32, b: u32) -> bool {
-        self.root(a) == self.root(b)
+    pub fn is_under(&self, root: u32, member: u32) -> bool {
+        self.0[member as usize].load(Relaxed) == root || self.root(member) == root
     }
 
     /// Makes one component of two.
@@ -64,7 +64,7 @@ mod tests {
         components.join(4, 2);
         let roots: Vec<u32> = (0..6).map(|i| components.root(i)).collect();
         assert_eq!(roots, [0, 1, 2, 1, 2, 1]);
-        assert!(components.are_joined(5, 1) && !components.are_joined(5, 2));
+        assert!(components.is_under(1, 5) && !components.is_under(2, 5));
     }
 
     #[test]

@@ -8,6 +8,10 @@ use crate::neighbors::{Coordinate, wide};
 const REACH: u64 = 2;
 /// Rows of cells around a cell, itself included, by their steps along the two outer axes.
 const ROWS: usize = 25;
+/// Rows from the nearest to the farthest; the first is that of the cell.
+const NEAR_FIRST: [usize; ROWS] = [
+    12, 7, 11, 13, 17, 6, 8, 16, 18, 2, 10, 14, 22, 1, 3, 5, 9, 15, 19, 21, 23, 0, 4, 20, 24,
+];
 /// A hair under 1, so that rounding of a cell index cannot part the points of one cell too far.
 const SHRINK: f64 = 1.0 - 1e-6;
 /// Cells along one axis up to which indices are exact enough for `SHRINK`: 2^28 2^-51 < 1e-6.
@@ -23,7 +27,7 @@ pub struct Grid<T> {
     pub points: Vec<[T; 3]>,
     /// Where each sorted point stands in the cloud.
     pub order: Vec<u32>,
-    keys: Vec<u64>,
+    keys: Vec<u64>, // of the cells, ascending, and one above all at the end
     starts: Vec<u32>,
     row_steps: [i64; ROWS],
 }
@@ -48,7 +52,7 @@ impl<T: Coordinate> Grid<T> {
 
     /// Number of cells that hold points.
     pub fn cells(&self) -> usize {
-        self.keys.len()
+        self.keys.len() - 1
     }
 
     /// Sorted places of the points of a cell.
@@ -94,7 +98,7 @@ impl<T: Coordinate> Grid<T> {
             keys: &self.keys,
             row_steps: &self.row_steps,
             cursors: std::array::from_fn(|row| cursor(&self.row_steps[row])),
-            rows: Vec::with_capacity(ROWS),
+            runs: Vec::with_capacity(ROWS),
         }
     }
 }
@@ -104,48 +108,52 @@ pub struct Walk<'g> {
     keys: &'g [u64],
     row_steps: &'g [i64; ROWS],
     cursors: [usize; ROWS],
-    rows: Vec<Range<usize>>,
+    runs: Vec<Range<usize>>,
 }
 
 impl Walk<'_> {
-    /// Runs of cells that may hold neighbours of `cell`, the cell itself among them; each call must
-    /// name a later cell than the one before.
+    /// Runs of cells that may hold neighbours of `cell`, nearest rows first, the cell itself in the
+    /// first. Calls must name later and later cells.
     #[inline]
-    pub fn around(&mut self, cell: usize) -> &[Range<usize>] {
-        self.rows.clear();
-        for row in 0..ROWS {
-            self.push_row(row, cell);
-        }
-        &self.rows
+    pub fn rows(&mut self, cell: usize) -> impl Iterator<Item = Range<usize>> {
+        NEAR_FIRST.into_iter().map(move |row| self.row(row, cell))
     }
 
-    /// The same without what lies before `cell`, so that each pair of cells is met once.
+    /// The same, put aside for several passes, without empty runs.
     #[inline]
-    pub fn after(&mut self, cell: usize) -> &[Range<usize>] {
-        self.rows.clear();
-        let own = ROWS / 2; // steps ascend, the middle one is the row of the cell
-        for row in own..ROWS {
-            self.push_row(row, cell);
+    pub fn around(&mut self, cell: usize) -> &[Range<usize>] {
+        self.runs.clear();
+        for row in NEAR_FIRST {
+            let run = self.row(row, cell);
+            if !run.is_empty() {
+                self.runs.push(run);
+            }
         }
-        self.rows[0].start = cell + 1;
-        &self.rows
+        &self.runs
+    }
+
+    /// The cells after `cell`, so that each pair of cells is met once, in the order of the cells.
+    #[inline]
+    pub fn after(&mut self, cell: usize) -> impl Iterator<Item = usize> {
+        let own = ROWS / 2; // steps ascend, the middle one is the row of the cell
+        let rows = (own..ROWS).flat_map(move |row| self.row(row, cell));
+        rows.skip_while(move |&other| other <= cell)
     }
 
     #[inline(always)]
-    fn push_row(&mut self, row: usize, cell: usize) {
+    fn row(&mut self, row: usize, cell: usize) -> Range<usize> {
         let middle = self.keys[cell].wrapping_add_signed(self.row_steps[row]);
+        let (first, last) = (middle.wrapping_sub(REACH), middle.wrapping_add(REACH));
         let mut start = self.cursors[row];
-        while start < self.keys.len() && self.keys[start] < middle - REACH {
+        while self.keys[start] < first {
             start += 1;
         }
         self.cursors[row] = start;
         let mut end = start;
-        while end < self.keys.len() && self.keys[end] <= middle + REACH {
+        while self.keys[end] <= last {
             end += 1;
         }
-        if end > start {
-            self.rows.push(start..end);
-        }
+        start..end
     }
 }
 
@@ -242,6 +250,7 @@ fn cells(entries: &[(u64, u32)]) -> (Vec<u64>, Vec<u32>) {
         keys.push(cell[0].0);
         starts.push(starts[starts.len() - 1] + cell.len() as u32);
     }
+    keys.push(u64::MAX);
     (keys, starts)
 }
 
@@ -276,7 +285,7 @@ mod tests {
         let (mut met, mut pairs) = (0, 0);
         for cell in 0..343 {
             met += walk.around(cell).iter().map(Range::len).sum::<usize>();
-            pairs += after.after(cell).iter().map(Range::len).sum::<usize>();
+            pairs += after.after(cell).count();
         }
         let along = 3 + 4 + 5 + 5 + 5 + 4 + 3; // neighbours of 7 cells in a line
         assert_eq!(met, along * along * along);

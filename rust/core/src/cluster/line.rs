@@ -106,7 +106,7 @@ impl LineClusters {
 /// 3. The curve with most clusters wins, of several the one that fits the samples of its clusters with
 ///    the smallest mean distance, then that of the lowest label; its clusters are kept.
 ///
-/// `labels` are those of [`super::dbscan`] on `samples_m`, or any others with -1 for noise.
+/// `labels` are those of [`super::dbscan()`] on `samples_m`, or any others with -1 for noise.
 ///
 /// # Errors
 /// [`FitError`] where lengths differ, all samples are noise, or a coordinate is not finite.

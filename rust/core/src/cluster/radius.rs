@@ -41,6 +41,11 @@ impl RadiusModel {
         self.slope * distance_m + self.beta_m
     }
 
+    /// Search radii at several distances, metres.
+    pub fn radii_at_m(&self, distances_m: &[f64]) -> Vec<f64> {
+        distances_m.iter().map(|&d| self.radius_m(d)).collect()
+    }
+
     /// Search radius of every point from its own distance to `origin_m`, metres: the model without
     /// intervals.
     ///
@@ -86,6 +91,11 @@ impl Intervals {
             max_m,
             count,
         })
+    }
+
+    /// Right edges for several distances, metres.
+    pub fn right_edges_m(&self, distances_m: &[f64]) -> Vec<f64> {
+        distances_m.iter().map(|&d| self.right_edge_m(d)).collect()
     }
 
     /// Right edge of the interval that holds `distance_m`; an inner edge belongs to the interval on

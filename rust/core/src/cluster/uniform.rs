@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::NOISE;
 use super::components::Components;
-use super::grid::Grid;
+use super::grid::{Grid, Walk};
 use crate::neighbors::{Coordinate, squared_distance};
 
 /// Distances computed between two looks at whether the count is full.
@@ -68,33 +68,51 @@ impl<T: Coordinate> Scene<T> {
         self.per_point(false, |block, cores| {
             let first = self.grid.members(block.start).start;
             let mut walk = self.grid.walk(block.start);
+            let mut counts = Vec::new();
             for cell in block {
                 let members = self.grid.members(cell);
-                if members.len() >= self.needed {
-                    cores[members.start - first..members.end - first].fill(true);
-                    continue;
+                if members.len() < self.needed {
+                    self.count_around(cell, &mut walk, &mut counts);
+                } else {
+                    counts.clear();
+                    counts.resize(members.len(), self.needed);
                 }
-                let rows = walk.around(cell);
-                for i in members {
-                    cores[i - first] = self.is_core(i, rows);
+                for (i, count) in members.zip(&counts) {
+                    cores[i - first] = *count >= self.needed;
                 }
             }
         })
     }
 
-    fn is_core(&self, i: usize, rows: &[Range<usize>]) -> bool {
-        let mut count = 0;
-        for row in rows {
-            for batch in self.grid.points[self.grid.members_of(row)].chunks(BATCH) {
-                let is_near =
-                    |q: &&[T; 3]| squared_distance(self.grid.points[i], **q) <= self.limit;
-                count += batch.iter().filter(is_near).count();
-                if count >= self.needed {
-                    return true;
-                }
+    /// Counts the neighbours of the points of a cell, nearest rows first, until all have enough.
+    fn count_around(&self, cell: usize, walk: &mut Walk<'_>, counts: &mut Vec<usize>) {
+        let members = self.grid.members(cell);
+        counts.clear();
+        counts.resize(members.len(), members.len()); // all of the cell, and the point itself
+        let mut rows = walk.rows(cell);
+        let own = rows.next().unwrap_or(cell..cell + 1);
+        let runs = [own.start..cell, cell + 1..own.end].into_iter().chain(rows);
+        for run in runs.filter(|run| !run.is_empty()) {
+            let others = &self.grid.points[self.grid.members_of(&run)];
+            let mut all_full = true;
+            for (i, count) in members.clone().zip(counts.iter_mut()) {
+                self.count_among(self.grid.points[i], others, count);
+                all_full &= *count >= self.needed;
+            }
+            if all_full {
+                return;
             }
         }
-        false
+    }
+
+    fn count_among(&self, point: [T; 3], others: &[[T; 3]], count: &mut usize) {
+        for batch in others.chunks(BATCH) {
+            if *count >= self.needed {
+                return;
+            }
+            let is_near = |q: &&[T; 3]| squared_distance(point, **q) <= self.limit;
+            *count += batch.iter().filter(is_near).count();
+        }
     }
 
     /// Joins cells that have cores within the radius of each other.
@@ -106,11 +124,12 @@ impl<T: Coordinate> Scene<T> {
         self.grid.blocks().into_par_iter().for_each(|block| {
             let mut walk = self.grid.walk(block.start);
             for cell in block.filter(|&cell| has_core[cell]) {
-                for other in walk.after(cell).iter().cloned().flatten() {
-                    let is_new =
-                        has_core[other] && !components.are_joined(cell as u32, other as u32);
+                let mut root = components.root(cell as u32);
+                for other in walk.after(cell).filter(|&other| has_core[other]) {
+                    let is_new = !components.is_under(root, other as u32);
                     if is_new && self.cells_touch(cell, other, cores) {
                         components.join(cell as u32, other as u32);
+                        root = components.root(root);
                     }
                 }
             }

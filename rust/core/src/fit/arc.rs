@@ -86,6 +86,16 @@ impl SpaceCurve {
         self.placed(t_m, t_m, Polynomial::value)
     }
 
+    /// Points at several parameters, metres.
+    pub fn points_m(&self, ts_m: &[f64]) -> Vec<[f64; 3]> {
+        ts_m.iter().map(|&t| self.point_m(t)).collect()
+    }
+
+    /// Shortest distances of several points from the curve, metres.
+    pub fn distances_m(&self, points_m: &[[f64; 3]]) -> Vec<f64> {
+        points_m.iter().map(|&p| self.distance_m(p)).collect()
+    }
+
     /// Derivative of the point by the parameter.
     pub fn tangent(&self, t_m: f64) -> [f64; 3] {
         self.placed(t_m, 1.0, Polynomial::slope)

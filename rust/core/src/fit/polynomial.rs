@@ -18,24 +18,42 @@ pub struct Polynomial {
 }
 
 impl Polynomial {
-    /// A polynomial in powers of t itself, lowest first.
+    /// A polynomial in powers of u = (t - center) / scale, lowest first.
     ///
     /// # Errors
-    /// [`InvalidValue`] without coefficients or where one is not finite.
-    pub fn from_powers(coefficients: Vec<f64>) -> Result<Self, InvalidValue> {
-        let is_sound = !coefficients.is_empty() && coefficients.iter().all(|c| c.is_finite());
-        if !is_sound {
-            return Err(InvalidValue {
-                name: "coefficients",
-                expected: "at least one, all finite".into(),
-                found: format!("{coefficients:?}"),
-            });
+    /// [`InvalidValue`] without coefficients, where a value is not finite, or where the scale is not
+    /// positive.
+    pub fn new(coefficients: Vec<f64>, center: f64, scale: f64) -> Result<Self, InvalidValue> {
+        let refuse = |name, expected: &str, found| {
+            Err(InvalidValue {
+                name,
+                expected: expected.into(),
+                found,
+            })
+        };
+        if coefficients.is_empty() || !coefficients.iter().all(|c| c.is_finite()) {
+            let found = format!("{coefficients:?}");
+            return refuse("coefficients", "at least one, all finite", found);
+        }
+        if !center.is_finite() {
+            return refuse("center", "a finite abscissa", center.to_string());
+        }
+        if !(scale > 0.0 && scale.is_finite()) {
+            return refuse("scale", "a positive length", scale.to_string());
         }
         Ok(Self {
             coefficients,
-            center: 0.0,
-            scale: 1.0,
+            center,
+            scale,
         })
+    }
+
+    /// A polynomial in powers of t itself, lowest first.
+    ///
+    /// # Errors
+    /// As [`Polynomial::new`].
+    pub fn from_powers(coefficients: Vec<f64>) -> Result<Self, InvalidValue> {
+        Self::new(coefficients, 0.0, 1.0)
     }
 
     /// Coefficients of the powers of u = (t - center) / scale, lowest first.
@@ -65,6 +83,16 @@ impl Polynomial {
             .iter()
             .rev()
             .fold(0.0, |sum, c| sum * u + c)
+    }
+
+    /// Values at several places.
+    pub fn values(&self, ts: &[f64]) -> Vec<f64> {
+        ts.iter().map(|&t| self.value(t)).collect()
+    }
+
+    /// First derivatives at several places.
+    pub fn slopes(&self, ts: &[f64]) -> Vec<f64> {
+        ts.iter().map(|&t| self.slope(t)).collect()
     }
 
     /// First derivative at `t`.
@@ -118,11 +146,21 @@ impl Polynomial {
     }
 }
 
+impl Polynomial {
+    /// Variances of the values at several places, from the covariance of the coefficients.
+    pub fn variances(&self, covariance: &DMatrix<f64>, ts: &[f64]) -> Vec<f64> {
+        let variance = |&t: &f64| {
+            let gradient = self.gradient(t);
+            gradient.dot(&(covariance * &gradient))
+        };
+        ts.iter().map(variance).collect()
+    }
+}
+
 impl Fit<Polynomial> {
     /// Variance of the value at `t`.
     pub fn variance_at(&self, t: f64) -> f64 {
-        let gradient = self.estimate.gradient(t);
-        gradient.dot(&(&self.covariance * &gradient))
+        self.estimate.variances(&self.covariance, &[t])[0]
     }
 }
 
@@ -303,6 +341,8 @@ mod tests {
         assert!(matches!(bad, FitError::NotFinite { index: 1, .. }));
         assert!(matches!(refuse(&[], &[], 0), FitError::TooFew { .. }));
         assert!(Polynomial::from_powers(vec![]).is_err());
+        assert!(Polynomial::new(vec![1.0], f64::NAN, 1.0).is_err());
+        assert!(Polynomial::new(vec![1.0], 0.0, 0.0).is_err());
     }
 
     proptest! {

@@ -9,6 +9,7 @@ pub mod beams;
 pub mod echoes;
 pub mod hesai;
 pub mod ouster;
+pub mod proof;
 pub mod robosense;
 pub mod unit;
 pub mod velodyne;
@@ -105,7 +106,7 @@ pub trait Model: Sync + std::fmt::Debug {
     fn fits(&self, payload: &[u8]) -> bool;
 
     /// Why `payload`, which fits by its size, was not recognised.
-    fn misfit(&self, payload: &[u8]) -> String;
+    fn misfit(&self, payload: &[u8]) -> Misfit;
 
     /// Times and angles of a data packet without its returns; `None` where the layout is broken.
     fn head(&self, payload: &[u8]) -> Option<Head>;
@@ -346,6 +347,15 @@ impl Tally {
     }
 }
 
+/// What speaks against a packet that nobody claims.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Misfit {
+    /// For people.
+    pub why: String,
+    /// The model that it may still be of, if the user says so.
+    pub may_be: Option<&'static str>,
+}
+
 /// Where a packet stands in its stream and in time.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
@@ -428,10 +438,10 @@ pub fn companion(payload: &[u8]) -> Option<PacketKind> {
     kinds.find(|kind| *kind != PacketKind::Data)
 }
 
-/// The model that a packet nobody claims comes closest to, and what speaks against it.
-pub fn closest(payload: &[u8]) -> Option<(ModelRef, String)> {
-    let model = MODELS.iter().copied().find(|model| model.fits(payload))?;
-    Some((model, model.misfit(payload)))
+/// How close a packet that nobody claims comes to a known model.
+pub fn closest(payload: &[u8]) -> Option<Misfit> {
+    let model = MODELS.iter().find(|model| model.fits(payload))?;
+    Some(model.misfit(payload))
 }
 
 #[cfg(test)]

@@ -39,6 +39,13 @@ pub struct ContourCurve {
     pub seen_z_m: [f64; 2],
 }
 
+impl ContourCurve {
+    /// Its point at `z_m`, metres, world frame.
+    pub fn point_m(&self, z_m: f64) -> [f64; 3] {
+        [self.x.estimate.value(z_m), self.y.estimate.value(z_m), z_m]
+    }
+}
+
 /// Fits both polynomials to the samples of one contour.
 ///
 /// # Errors

@@ -4,12 +4,14 @@ use nalgebra::{Point3, Unit, Vector3};
 
 use super::curves::{ContourCurve, Degrees, fit_contour};
 use super::frames::{Frame, Share};
+use super::sections::MidLine;
 use super::tip::{NoTip, Plane, Tip, TipLimits, intersect};
 use crate::blade::contour::{LineExtremes, line_extremes};
 use crate::cluster::NOISE;
 use crate::cluster::dbscan::{DbscanParams, dbscan};
 use crate::cluster::line::{LineParams, line_clusters};
 use crate::cluster::radius::{Intervals, RadiusModel};
+use crate::error::InvalidValue;
 use crate::fit::Fit;
 use crate::fit::polynomial::Polynomial;
 use crate::time::Timestamp;
@@ -33,15 +35,15 @@ pub struct FrameParams {
     pub model: RadiusModel,
     /// Step 6: the distance that goes into it.
     pub rule: RadiusRule,
-    /// Step 6: MinPts.
+    /// Step 6: `MinPts`.
     pub min_points: usize,
-    /// Step 6: core if more than MinPts, as printed, instead of at least.
+    /// Step 6: core if more than `MinPts`, as printed, instead of at least.
     pub strict: bool,
     /// Step 7: direction of the leading edge along the chord, world frame.
     pub leading_edge: Unit<Vector3<f64>>,
     /// Step 8: radius along one contour; `None` for 1.5 times the largest distance between lines.
     pub contour_radius_m: Option<f64>,
-    /// Step 8: MinPts along one contour.
+    /// Step 8: `MinPts` along one contour.
     pub contour_min_points: usize,
     /// Step 8: degree of the curve through a cluster and D of (13).
     pub line: LineParams,
@@ -79,6 +81,14 @@ pub struct Contours {
 }
 
 impl Contours {
+    /// The line between them.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] where their coefficients are not finite.
+    pub fn middle(&self) -> Result<MidLine, InvalidValue> {
+        MidLine::new(&self.leading, &self.trailing)
+    }
+
     /// Leading minus trailing edge at `z_m`, metres; nothing along z by construction.
     pub fn chord_m(&self, z_m: f64) -> [f64; 3] {
         let across = |a: &Fit<Polynomial>, b: &Fit<Polynomial>| {

@@ -28,6 +28,11 @@ impl PassThrough {
         })
     }
 
+    /// Which points lie in the box.
+    pub fn mask(&self, points_m: &[[f32; 3]]) -> Vec<bool> {
+        points_m.iter().map(|point| self.contains(point)).collect()
+    }
+
     /// Whether a point lies in the box.
     pub fn contains(&self, point_m: &[f32; 3]) -> bool {
         (0..3).all(|axis| (self.min_m[axis]..=self.max_m[axis]).contains(&point_m[axis]))

@@ -1,6 +1,7 @@
 //! Step 11: sections by arc length from the tip, equation (15).
 
 use super::curves::ContourCurve;
+use crate::error::{FitError, InvalidValue};
 use crate::fit::Fit;
 use crate::fit::arc::{SpaceCurve, SpanAxis};
 use crate::fit::polynomial::Polynomial;
@@ -13,13 +14,16 @@ const TOLERANCE_M: f64 = 1e-4;
 pub struct MidLine(SpaceCurve);
 
 impl MidLine {
-    /// The line between two contours; `None` where their coefficients overflow.
-    pub fn new(leading: &ContourCurve, trailing: &ContourCurve) -> Option<Self> {
+    /// The line between two contours.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] where their coefficients are not finite.
+    pub fn new(leading: &ContourCurve, trailing: &ContourCurve) -> Result<Self, InvalidValue> {
         let across = [
             mean(&leading.x, &trailing.x)?,
             mean(&leading.y, &trailing.y)?,
         ];
-        Some(Self(SpaceCurve {
+        Ok(Self(SpaceCurve {
             axis: SpanAxis::Z,
             across,
         }))
@@ -31,22 +35,27 @@ impl MidLine {
     }
 
     /// Arc length from `from_z_m` to `to_z_m`, metres, equation (15).
-    pub fn length_m(&self, from_z_m: f64, to_z_m: f64) -> Option<f64> {
-        self.0.arc_length_m(from_z_m, to_z_m, TOLERANCE_M).ok()
+    ///
+    /// # Errors
+    /// [`FitError::NotConverged`] for ends that are not finite.
+    pub fn length_m(&self, from_z_m: f64, to_z_m: f64) -> Result<f64, FitError> {
+        self.0.arc_length_m(from_z_m, to_z_m, TOLERANCE_M)
     }
 
     /// The point `length_m` before `tip_z_m`, measured along the line.
-    pub fn before_tip_m(&self, tip_z_m: f64, length_m: f64) -> Option<[f64; 3]> {
-        let z_m = self.0.walk_m(tip_z_m, -length_m, TOLERANCE_M).ok()?;
-        Some(self.point_m(z_m))
+    ///
+    /// # Errors
+    /// [`FitError::NotConverged`] for places that are not finite.
+    pub fn before_tip_m(&self, tip_z_m: f64, length_m: f64) -> Result<[f64; 3], FitError> {
+        let z_m = self.0.walk_m(tip_z_m, -length_m, TOLERANCE_M)?;
+        Ok(self.point_m(z_m))
     }
 }
 
 /// Half-way between two polynomials of one degree.
-fn mean(a: &Fit<Polynomial>, b: &Fit<Polynomial>) -> Option<Polynomial> {
+fn mean(a: &Fit<Polynomial>, b: &Fit<Polynomial>) -> Result<Polynomial, InvalidValue> {
     let pairs = a.estimate.powers().into_iter().zip(b.estimate.powers());
-    let powers = pairs.map(|(a, b)| 0.5 * (a + b)).collect();
-    Polynomial::from_powers(powers).ok()
+    Polynomial::from_powers(pairs.map(|(a, b)| 0.5 * (a + b)).collect())
 }
 
 #[cfg(test)]
@@ -58,7 +67,7 @@ mod tests {
     fn contours() -> [ContourCurve; 2] {
         [1.0, -1.0].map(|side| {
             let samples: Vec<[f64; 3]> = (0..20)
-                .map(|i| f64::from(i))
+                .map(f64::from)
                 .map(|z| [0.75 * z + side, 2.0, z])
                 .collect();
             fit_contour(&samples, Degrees::new(1, 2).unwrap()).unwrap()

@@ -187,7 +187,7 @@ impl ContourSeries {
     pub fn arc_to_tip_m(&self, plane: Plane, z_m: &[f64]) -> Vec<f64> {
         self.at_each(z_m, f64::NAN, |frame, z| {
             let tip = frame.tip(plane).ok()?;
-            mid_line(frame)?.length_m(z, tip.z_m)
+            mid_line(frame)?.length_m(z, tip.z_m).ok()
         })
     }
 
@@ -195,7 +195,7 @@ impl ContourSeries {
     pub fn sections_m(&self, plane: Plane, to_tip_m: &[f64]) -> Vec<[f64; 3]> {
         self.at_each(to_tip_m, [f64::NAN; 3], |frame, length| {
             let tip = frame.tip(plane).ok()?;
-            mid_line(frame)?.before_tip_m(tip.z_m, length)
+            mid_line(frame)?.before_tip_m(tip.z_m, length).ok()
         })
     }
 
@@ -239,13 +239,157 @@ impl ContourSeries {
 }
 
 fn mid_line(frame: &FrameContours) -> Option<MidLine> {
-    frame
-        .contours
-        .as_ref()
-        .and_then(|both| MidLine::new(&both.leading, &both.trailing))
+    frame.contours.as_ref()?.middle().ok()
 }
 
 fn sample(frame: &Frame, params: &FrameParams, sampling: Sampling) -> Vec<BladePoints> {
     let of = |(lidar, share)| blade_of(share, lidar, params).1.thinned(sampling.points);
     frame.shares.iter().enumerate().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cluster::line::LineParams;
+    use crate::cluster::radius::{Intervals, RadiusModel};
+    use crate::fit::arc::SpanAxis;
+    use crate::paper::curves::Degrees;
+    use crate::paper::frame::RadiusRule;
+    use crate::paper::frames::Share;
+    use crate::paper::tip::TipLimits;
+    use nalgebra::Vector3;
+    use rayon::ThreadPoolBuilder;
+
+    /// Tip of the wedge that stands for a blade, metres.
+    const TIP_M: f64 = 110.0;
+
+    /// A flat wedge at height 0, shifted by `x_m`, seen in eight lines around `middle_m`, with two stray echoes
+    /// and, in the last line, a saddle that sticks out by 3 m.
+    fn share(middle_m: f64, x_m: f64, has_saddle: bool) -> Share {
+        let mut share = Share {
+            present: true,
+            ..Share::default()
+        };
+        for ring in 0..8u16 {
+            let z = middle_m + 0.3 * (f64::from(ring) - 3.5);
+            let half = 0.05 * (TIP_M - z) + if has_saddle && ring == 7 { 3.0 } else { 0.0 };
+            for k in 0..=100 {
+                let x = x_m + half * (f64::from(k) / 50.0 - 1.0);
+                share.points_m.push([x as f32, 0.0, z as f32]);
+                share.rings.push(ring);
+            }
+        }
+        share
+            .points_m
+            .extend([[9.0, 3.0, middle_m as f32], [-4.0, 2.0, middle_m as f32]]);
+        share.rings.extend([3, 3]);
+        share
+    }
+
+    fn sensors_m() -> Vec<Point3<f64>> {
+        vec![Point3::new(0.0, -7.0, 90.0), Point3::new(0.0, -7.0, 104.0)]
+    }
+
+    fn params(rule: RadiusRule) -> FrameParams {
+        FrameParams {
+            sensors_m: sensors_m(),
+            model: RadiusModel::new(0.2f64.to_radians(), 1.5, 0.05, 4).unwrap(),
+            rule,
+            min_points: 4,
+            strict: false,
+            leading_edge: -Vector3::x_axis(),
+            contour_radius_m: None,
+            contour_min_points: 3,
+            line: LineParams::new(SpanAxis::Z, [1, 1], 0.6).unwrap(),
+            degrees: Degrees::new(1, 2).unwrap(),
+            tip: TipLimits::new(5.0).unwrap(),
+            overhead_m: None,
+        }
+    }
+
+    fn frame(x_m: f64) -> Frame {
+        let shares = vec![share(90.0, x_m, true), share(104.0, x_m, false)];
+        Frame {
+            time: Timestamp(7),
+            shares,
+        }
+    }
+
+    fn series(frames: &[Frame], params: FrameParams) -> ContourSeries {
+        let mut series = ContourSeries::new(
+            params,
+            Sampling {
+                every: 1,
+                points: 50,
+            },
+        );
+        series.extend(frames);
+        series
+    }
+
+    #[test]
+    fn a_wedge_gives_its_tip_and_its_sections_despite_strays_and_a_saddle() {
+        let mut ranges = DistanceRanges::new(2);
+        ranges.extend(&[frame(0.0), frame(2.0)], &sensors_m());
+        let division = |range: &Option<[f64; 2]>| {
+            range.map(|[low, high]| Intervals::new(low, high, 8).unwrap())
+        };
+        let intervals = RadiusRule::Intervals(ranges.ranges_m().iter().map(division).collect());
+        for rule in [intervals, RadiusRule::Continuous] {
+            let series = series(&[frame(0.0), frame(2.0)], params(rule));
+            assert_eq!(series.failures(Plane::Xoz), [None, None]);
+            for (tip, x_m) in series.tip_z_m(Plane::Xoz).into_iter().zip([0.0, 2.0]) {
+                assert!((tip - TIP_M).abs() < 1e-3, "{tip} at {x_m}");
+            }
+            let sections = series.sections_m(Plane::Xoz, &[20.0]);
+            for (section, x_m) in sections.iter().zip([0.0, 2.0]) {
+                let expected = Vector3::new(x_m, 0.0, TIP_M - 20.0);
+                assert!((Vector3::from(*section) - expected).norm() < 1e-3);
+            }
+            // Strays were noise of step 6, the saddle's line did not agree in step 8.
+            assert_eq!(series.uses(|used| used.points - used.used), [2, 2, 2, 2]);
+            assert_eq!(series.left_out().reason, ["alone"; 4]);
+        }
+    }
+
+    #[test]
+    fn both_edges_at_one_height_give_no_tip_there() {
+        let series = series(&[frame(0.0)], params(RadiusRule::Continuous));
+        assert!(series.failures(Plane::Yoz)[0].is_some());
+        assert!(series.sections_m(Plane::Yoz, &[20.0])[0][0].is_nan());
+    }
+
+    #[test]
+    fn an_overhead_blade_and_an_empty_frame_are_named() {
+        let overhead = FrameParams {
+            overhead_m: Some(1.5),
+            ..params(RadiusRule::Continuous)
+        };
+        let empty = Frame {
+            time: Timestamp(0),
+            shares: vec![Share::default(); 2],
+        };
+        let series = series(&[frame(0.0), frame(20.0), empty], overhead);
+        assert_eq!(
+            series.uses(|used| used.overhead),
+            [true, true, false, false, false, false]
+        );
+        assert_eq!(series.failures(Plane::Xoz)[0], Some("no_points"));
+        assert_eq!(series.failures(Plane::Xoz)[2], Some("no_points"));
+        assert!(series.seen_z_m()[0][0].is_nan());
+    }
+
+    #[test]
+    fn results_are_the_same_for_any_number_of_threads() {
+        let frames: Vec<Frame> = (0..16).map(|k| frame(0.1 * f64::from(k))).collect();
+        let with = |threads: usize| {
+            let pool = ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
+            let params = params(RadiusRule::Continuous);
+            pool.install(|| series(&frames, params).sections_m(Plane::Xoz, &[5.0, 20.0]))
+        };
+        assert_eq!(with(1), with(3));
+    }
 }

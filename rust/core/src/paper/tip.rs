@@ -1,7 +1,9 @@
 //! Step 10: the tip as the intersection of both contour curves, projected on a plane.
 
+use thiserror::Error;
+
 use super::curves::ContourCurve;
-use crate::error::InvalidValue;
+use crate::error::{Coded, InvalidValue};
 use crate::fit::Fit;
 use crate::fit::polynomial::Polynomial;
 
@@ -47,11 +49,13 @@ pub struct Tip {
 }
 
 /// Why a frame has no tip: never a number instead.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum NoTip {
-    /// The curves do not meet within one visible length beyond the last sample.
+    /// The curves do not meet within two visible lengths beyond the last sample.
+    #[error("the contour curves do not meet within two visible lengths beyond the last scan line")]
     NoIntersection,
     /// The curves are nearly parallel where they meet.
+    #[error("the contour curves are nearly parallel where they meet: the tip is ill-posed")]
     IllPosed,
 }
 
@@ -65,10 +69,25 @@ impl NoTip {
     }
 }
 
+impl Coded for NoTip {
+    fn code(&self) -> &'static str {
+        match self {
+            NoTip::NoIntersection => "measurement.no_intersection",
+            NoTip::IllPosed => "measurement.ill_posed",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        Some("try the other plane, or other degrees of the curves".into())
+    }
+}
+
+/// The curves must meet within so many visible lengths beyond the last sample.
+const BEYOND_END: f64 = 2.0;
 /// The curves may meet a little before the last sample: share of the visible length.
 const BEFORE_END: f64 = 0.15;
-/// Steps of the search for a change of sign, over one visible length.
-const STEPS: u32 = 256;
+/// Steps of the search for a change of sign.
+const STEPS: u32 = 512;
 
 /// Intersects both contour curves on a plane, beyond the visible part of the blade.
 ///
@@ -84,8 +103,8 @@ pub fn intersect(
     let end = leading.seen_z_m[1].max(trailing.seen_z_m[1]);
     let length = end - leading.seen_z_m[0].min(trailing.seen_z_m[0]);
     let gap = |z: f64| a.estimate.value(z) - b.estimate.value(z);
-    let z_m =
-        first_root(gap, end - BEFORE_END * length, end + length).ok_or(NoTip::NoIntersection)?;
+    let z_m = first_root(gap, end - BEFORE_END * length, end + BEYOND_END * length)
+        .ok_or(NoTip::NoIntersection)?;
     let slope = (a.estimate.slope(z_m) - b.estimate.slope(z_m)).abs();
     let u_z_m = (a.variance_at(z_m) + b.variance_at(z_m)).sqrt() / slope;
     if u_z_m <= limits.max_u_m {
@@ -111,9 +130,9 @@ fn first_root(f: impl Fn(f64) -> f64, from: f64, to: f64) -> Option<f64> {
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
         if (f(middle) > 0.0) == rising {
-            high = middle
+            high = middle;
         } else {
-            low = middle
+            low = middle;
         }
     }
     Some(0.5 * (low + high))

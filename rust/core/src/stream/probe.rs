@@ -1,7 +1,7 @@
 //! Which model a stream's packets are of: by their identifying bytes, and by the packet period where
 //! those are not believed.
 
-use crate::packet::{Head, MODELS, ModelRef, PacketKind, claimants};
+use crate::packet::{Head, MODELS, Misfit, ModelRef, PacketKind, claimants};
 use crate::time::Timestamp;
 
 /// Packets after which a stream is decided.
@@ -151,13 +151,24 @@ impl Probe {
         payloads.filter(move |payload| model.recognise(payload) == Some(PacketKind::Data))
     }
 
-    /// Why nothing was decided although packets were claimed.
-    pub fn doubt(&self) -> Option<(String, ModelRef)> {
+    /// Why nothing was decided although packets were claimed, and the model of their size whose packet
+    /// period they have.
+    pub fn doubt(&self) -> Option<Misfit> {
         let model = self.claimants().into_iter().next()?;
         let found_us = self.period_ns(model)? / 1000.0;
         let title = model.title();
         let why = format!("the bytes fit {title}, the packet period of {found_us:.0} us does not");
-        Some((why, model))
+        let fitting = MODELS.iter().copied().filter(|model| {
+            let mut payloads = self.packets.iter().map(|(_, payload)| payload);
+            payloads.all(|payload| model.fits(payload))
+        });
+        let errors = fitting.filter_map(|model| Some((model, self.period_error(model)?)));
+        let near = errors.filter(|(_, error)| *error < PERIOD_TOLERANCE);
+        let nearest = near.min_by(|(_, one), (_, other)| one.total_cmp(other));
+        Some(Misfit {
+            why,
+            may_be: nearest.map(|(model, _)| model.id()),
+        })
     }
 
     /// The packets taken so far, in the order of arrival.
@@ -168,17 +179,16 @@ impl Probe {
     /// How far the packet period of the data is off the model's, as a share; `None` where there are too
     /// few packets to tell.
     fn period_error(&self, model: ModelRef) -> Option<f64> {
-        let head = self.own(model).find_map(|payload| model.head(payload))?;
+        let mut payloads = self.packets.iter().map(|(_, payload)| payload);
+        let head = payloads.find_map(|payload| model.head(payload))?;
         let period_ns = model.period_ns(head.return_mode) as f64;
         Some((self.period_ns(model)? / period_ns - 1.0).abs())
     }
 
     /// Median step of device time; `None` for fewer than three steps.
     fn period_ns(&self, model: ModelRef) -> Option<f64> {
-        let heads: Vec<Head> = self
-            .own(model)
-            .filter_map(|payload| model.head(payload))
-            .collect();
+        let payloads = self.packets.iter().map(|(_, payload)| payload);
+        let heads: Vec<Head> = payloads.filter_map(|payload| model.head(payload)).collect();
         let steps = heads
             .windows(2)
             .map(|pair| pair[1].device_ns - pair[0].device_ns);

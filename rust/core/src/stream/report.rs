@@ -8,9 +8,9 @@ use crate::drops::Drops;
 use crate::error::UnitError;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
-use crate::packet::ModelRef;
 use crate::packet::unit::{Calibration, UnitFile};
 use crate::packet::velodyne::position::Pps;
+use crate::packet::{Misfit, ModelRef};
 use crate::time::Timestamp;
 
 /// One lidar of a capture.
@@ -129,7 +129,7 @@ pub struct OtherStream {
     /// Datagrams a second.
     pub rate_hz: f64,
     /// The sensor that it comes closest to, and what speaks against it.
-    pub closest: Option<(&'static str, String)>,
+    pub closest: Option<Misfit>,
 }
 
 /// A stretch in which nothing at all was recorded.
@@ -183,14 +183,13 @@ impl ScanReport {
         for given in named {
             let lidars = || self.lidars.iter().filter(|lidar| given.is_for(&lidar.key));
             if !lidars().any(|lidar| lidar.model.takes(&given.file)) {
-                let models: Vec<&str> = lidars().map(|lidar| lidar.model.title()).collect();
+                let mut models: Vec<&str> = lidars().map(|lidar| lidar.model.title()).collect();
+                if models.is_empty() {
+                    models.push("a lidar that is in the capture");
+                }
                 return Err(UnitError::NotTaken {
                     file: given.file.name.clone(),
-                    models: if models.is_empty() {
-                        "a lidar that is in the capture".into()
-                    } else {
-                        models.join(", ")
-                    },
+                    models: models.join(", "),
                     found: given.file.first_line(),
                 });
             }

@@ -2,32 +2,23 @@
 
 use std::collections::HashMap;
 
-use super::arrivals::{Arrival, Arrivals, Gap, Ordered, Ticket, mark};
-use super::probe::{Choice, Probe};
-use super::report::{OtherStream, Pause, PositionFacts, ScanReport, Second, StreamInfo};
+use super::lidar::{Lidar, Shared};
+use super::probe::Probe;
+use super::report::{OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
 use super::{ScanOptions, StreamKey};
 use crate::capture::Datagram;
-use crate::clock::ClockEstimator;
 use crate::drops::Drops;
-use crate::loss::Counts;
-use crate::loss::view::FieldOfView;
-use crate::packet::unit::{Calibration, Gather, UnitFile};
+use crate::packet::unit::UnitFile;
 use crate::packet::velodyne::position::{Position, Pps};
-use crate::packet::{ModelRef, PacketKind, Tally, closest, companion};
-use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
+use crate::packet::{Misfit, PacketKind, closest, companion};
+use crate::time::{NANOS_PER_SECOND, Timestamp};
 
 /// Silence of the whole capture for longer than this is a pause of the recording, not loss.
 const PAUSE_NS: i64 = 10 * NANOS_PER_SECOND;
 /// Streams beyond so many are counted, not followed.
 const MAX_STREAMS: usize = 4096;
-/// Gaps wait for the field of view to be known, but not more of them than this.
-const MAX_PENDING: usize = 4096;
 /// Foreign datagrams before a stream is decided whose second is remembered.
 const MAX_EARLY: usize = 1024;
-/// Turns after which the field of view is known.
-const VIEW_TURNS: u32 = 5;
-/// More packets than one sensor can send by this factor come from two.
-const CROWDED: f64 = 1.3;
 
 /// Sums over the streams of a capture.
 #[derive(Debug)]
@@ -40,14 +31,6 @@ pub struct Scan {
     last_arrival: Option<Timestamp>,
 }
 
-/// What all lidars of a capture have in common.
-#[derive(Debug, Default)]
-struct Shared {
-    /// UTC of the first lidar packet as far as it can be told: where seconds are counted from.
-    origin: Option<Timestamp>,
-    pauses: Vec<Pause>,
-}
-
 #[derive(Debug)]
 struct Stream {
     state: State,
@@ -58,7 +41,7 @@ struct Stream {
     first: Timestamp,
     last: Timestamp,
     payload_len: usize,
-    closest: Option<(&'static str, String)>,
+    closest: Option<Misfit>,
     position: Option<PositionFacts>,
     /// The last packet that describes a unit.
     metadata: Option<UnitFile>,
@@ -68,29 +51,6 @@ struct Stream {
 enum State {
     Probing(Probe),
     Lidar(Box<Lidar>),
-}
-
-#[derive(Debug)]
-struct Lidar {
-    model: ModelRef,
-    is_named: bool,
-    candidates: Vec<&'static str>,
-    gather: Option<Box<dyn Gather>>,
-    arrivals: Arrivals<Tally>,
-    clock: ClockEstimator,
-    view: FieldOfView,
-    pending: Vec<Gap>,
-    seconds: Vec<Second>,
-    counts: Counts,
-    tally: (u64, u64),
-    turned_rad: f64,
-    turned_ns: i64,
-    first: Option<Ordered>,
-    last: Option<Ordered>,
-    clashing: u64,
-    mode_changes: u64,
-    broken: u64,
-    source_ports: Vec<(u16, u64)>,
 }
 
 impl Scan {
@@ -182,12 +142,10 @@ impl Scan {
     /// Adds what is known of the unit: the user's files, else what its own packets say.
     fn with_unit(&self, mut info: StreamInfo, lidar: &Lidar) -> StreamInfo {
         let mut files = self.options.unit_files(&info.key);
-        let same = self
-            .streams
-            .iter()
-            .filter(|(other, _)| other.address == info.key.address);
+        let streams = self.streams.iter();
+        let same = streams.filter(|(other, _)| other.address == info.key.address);
         files.extend(same.filter_map(|(_, stream)| stream.metadata.clone()));
-        files.extend(lidar.gather.as_ref().and_then(|gather| gather.file()));
+        files.extend(lidar.gathered());
         files.retain(|file| info.model.takes(file));
         info.calibration = info.model.fit(&files).map(|fitted| fitted.calibration);
         let facts = info.model.describe(&files);
@@ -249,8 +207,7 @@ impl Stream {
                         self.early_foreign.push(datagram.time);
                     }
                     if self.closest.is_none() {
-                        let near = closest(payload);
-                        self.closest = near.map(|(model, why)| (model.id(), why));
+                        self.closest = closest(payload);
                     }
                 }
             }
@@ -322,8 +279,8 @@ impl Stream {
         match &mut self.state {
             State::Lidar(lidar) => lidar.finish(shared),
             State::Probing(probe) => {
-                if let Some((why, model)) = probe.doubt() {
-                    self.closest = Some((model.id(), why));
+                if let Some(misfit) = probe.doubt() {
+                    self.closest = Some(misfit);
                 }
             }
         }
@@ -346,277 +303,6 @@ impl Stream {
     }
 }
 
-impl Lidar {
-    fn new(choice: Choice, is_named: bool) -> Self {
-        let model = choice.model;
-        Self {
-            model,
-            is_named,
-            candidates: choice.candidates,
-            gather: model.gather(),
-            arrivals: Arrivals::new(model),
-            clock: ClockEstimator::default(),
-            view: FieldOfView::default(),
-            pending: Vec::new(),
-            seconds: Vec::new(),
-            counts: Counts::default(),
-            tally: (0, 0),
-            turned_rad: 0.0,
-            turned_ns: 0,
-            first: None,
-            last: None,
-            clashing: 0,
-            mode_changes: 0,
-            broken: 0,
-            source_ports: Vec::new(),
-        }
-    }
-
-    fn is_data(&self, payload: &[u8]) -> bool {
-        if self.is_named {
-            self.model.fits(payload)
-        } else {
-            self.model.recognise(payload) == Some(PacketKind::Data)
-        }
-    }
-
-    fn count_port(&mut self, port: u16) {
-        let ports = &mut self.source_ports;
-        let place = ports.iter().position(|(known, _)| *known == port);
-        match place {
-            Some(place) => ports[place].1 += 1,
-            None if ports.len() < 8 => ports.push((port, 1)),
-            None => {}
-        }
-    }
-
-    fn push(&mut self, arrival: Timestamp, payload: &[u8], shared: &mut Shared) {
-        let Some(head) = self.model.head(payload) else {
-            self.broken += 1;
-            return;
-        };
-        if let Some(gather) = &mut self.gather {
-            gather.take(payload);
-        }
-        let tally = self.model.tally(payload);
-        let (ticket, what) = self.arrivals.offer(arrival, &head, mark(payload), || tally);
-        match what {
-            Arrival::Next(ordered) => self.take(&ordered, tally, shared),
-            Arrival::Held => {}
-            Arrival::Duplicate => self.at(&ticket, shared, |counts| counts.duplicated += 1),
-            Arrival::TooLate { was_lost } => self.at(&ticket, shared, |counts| {
-                counts.late += 1;
-                counts.too_late += 1;
-                counts.lost -= u64::from(was_lost && counts.lost > 0);
-            }),
-            Arrival::Clash => self.clashing += 1,
-        }
-        self.drain(shared);
-    }
-
-    fn drain(&mut self, shared: &mut Shared) {
-        while let Some((ordered, tally)) = self.arrivals.pop() {
-            self.take(&ordered, tally, shared);
-        }
-    }
-
-    /// Changes the counts of the whole and of the second in which a packet was sent.
-    fn at(&mut self, ticket: &Ticket, shared: &Shared, change: impl Fn(&mut Counts)) {
-        change(&mut self.counts);
-        let time = self.clock.estimate(ticket.device);
-        change(&mut self.second(time, shared).counts);
-    }
-
-    fn take(&mut self, ordered: &Ordered, tally: Tally, shared: &mut Shared) {
-        let Ticket {
-            arrival,
-            device,
-            head,
-            ..
-        } = ordered.ticket;
-        let pair = TimePair {
-            host: arrival,
-            device,
-        };
-        self.clock.add(ordered.segment, pair, head.duration_ns);
-        let time = self.clock.estimate(device);
-        shared.origin.get_or_insert(time);
-        if let Some(gap) = ordered.gap {
-            self.pending.push(gap);
-        }
-        head.arcs().for_each(|arc| self.view.observe(arc));
-        if self.view.turns() >= VIEW_TURNS || self.pending.len() > MAX_PENDING {
-            self.settle(shared);
-        }
-        self.count(ordered, tally, time, shared);
-        if let Some(last) = &self.last {
-            let is_change = last.ticket.head.return_mode != head.return_mode;
-            self.mode_changes += u64::from(is_change);
-        }
-        self.first.get_or_insert(*ordered);
-        self.last = Some(*ordered);
-    }
-
-    fn count(&mut self, ordered: &Ordered, tally: Tally, time: Timestamp, shared: &Shared) {
-        let head = ordered.ticket.head;
-        let offset_ns = (ordered.ticket.arrival - ordered.ticket.device) - head.duration_ns;
-        let second = self.second(time, shared);
-        second.points += u64::from(tally.points);
-        second.turned_rad += head.turned_rad;
-        second.turned_ns += head.duration_ns;
-        second.offset_ns = Some(second.offset_ns.map_or(offset_ns, |o| o.min(offset_ns)));
-        second.counts.packets += 1;
-        second.counts.late += u64::from(ordered.is_late);
-        self.counts.packets += 1;
-        self.counts.late += u64::from(ordered.is_late);
-        self.tally.0 += u64::from(tally.points);
-        self.tally.1 += u64::from(tally.merged);
-        self.turned_rad += head.turned_rad;
-        self.turned_ns += head.duration_ns;
-    }
-
-    /// Counts gaps as loss, as far as they lie in the field of view.
-    fn settle(&mut self, shared: &Shared) {
-        for gap in std::mem::take(&mut self.pending) {
-            let lost = gap.lost_in(&self.view, &shared.pauses);
-            self.counts.lost += lost;
-            let mut rest = lost;
-            // Packets of a long outage belong to many seconds, of a short gap to one or two.
-            let mut from = gap.from;
-            while rest > 0 {
-                let time = self.clock.estimate(from);
-                let second_end = second_number(time, shared.origin) + 1;
-                let end = shared.origin.unwrap_or(time) + second_end as i64 * NANOS_PER_SECOND;
-                let room = ((end - time) / gap.period_ns.max(1) + 1) as u64;
-                let here = rest.min(room.max(1));
-                self.second(time, shared).counts.lost += here;
-                rest -= here;
-                from = from + here as i64 * gap.period_ns;
-            }
-        }
-    }
-
-    fn second(&mut self, time: Timestamp, shared: &Shared) -> &mut Second {
-        let number = second_number(time, shared.origin);
-        if number >= self.seconds.len() {
-            self.seconds.resize(number + 1, Second::default());
-        }
-        &mut self.seconds[number]
-    }
-
-    fn finish(&mut self, shared: &mut Shared) {
-        self.arrivals.flush();
-        self.drain(shared);
-        self.settle(shared);
-        let strays = self.arrivals.take_strays();
-        self.clashing += strays.clashing;
-        self.counts.duplicated += strays.duplicated;
-        self.counts.late += strays.too_late;
-        self.counts.too_late += strays.too_late;
-        self.counts.lost = self.counts.lost.saturating_sub(strays.were_lost);
-    }
-
-    fn add_drops(&self, drops: &mut Drops) {
-        drops.add("duplicated", self.counts.duplicated);
-        drops.add("too_late", self.counts.too_late);
-        drops.add("other_sensor", self.clashing);
-        drops.add("packet_broken", self.broken);
-    }
-
-    /// `None` where not a single packet came through.
-    fn describe(
-        &self,
-        key: StreamKey,
-        foreign: u64,
-        position: Option<PositionFacts>,
-    ) -> Option<StreamInfo> {
-        let (first, last) = (self.first?, self.last?);
-        let is_locked = position.as_ref().is_some_and(PositionFacts::is_locked);
-        let clock = self.clock.finish(is_locked);
-        let end = last.ticket.device + last.ticket.head.duration_ns;
-        let minutes = self.turned_ns as f64 / 60e9;
-        let mut info = StreamInfo {
-            key,
-            model: self.model,
-            is_named: self.is_named,
-            candidates: self.candidates.clone(),
-            unit: Vec::new(),
-            calibration: Ok(Calibration::Factory),
-            return_mode: last.ticket.head.return_mode.name(),
-            rpm: self.turned_rad / std::f64::consts::TAU / minutes.max(f64::MIN_POSITIVE),
-            counts: self.counts,
-            points: self.tally.0,
-            merged: self.tally.1,
-            foreign,
-            first: clock.utc(first.segment, first.ticket.device),
-            last: clock.utc(last.segment, end),
-            clock,
-            position,
-            view: self.view.clone(),
-            conflict: self.conflict(&key, first.ticket.device, end),
-            notes: Vec::new(),
-            seconds: self.seconds.clone(),
-            source_ports: self.source_ports.clone(),
-        };
-        info.notes = self.notes(&info);
-        Some(info)
-    }
-
-    /// Whether two sensors send under one name.
-    fn conflict(&self, key: &StreamKey, from: Timestamp, to: Timestamp) -> Option<String> {
-        let head = self.last?.ticket.head;
-        let period_ns = self.model.period_ns(head.return_mode) as f64;
-        let room = ((to - from) as f64 / period_ns).max(1.0);
-        let arrived = self.counts.packets + self.clashing;
-        let is_crowded = self.clashing >= 16 && self.clashing * 20 > arrived
-            // Numbers that follow each other are one sensor's, whatever its model makes of the time.
-            || head.sequence.is_none()
-                && self.counts.packets >= 32
-                && self.counts.packets as f64 > CROWDED * room;
-        let is_jump_free = self.last?.segment == 0;
-        (is_crowded && (is_jump_free || self.clashing > 0)).then(|| {
-            format!(
-                "two sensors send from {} to port {}: {} of {arrived} packets do not fit one clock",
-                key.address, key.port, self.clashing
-            )
-        })
-    }
-
-    fn notes(&self, info: &StreamInfo) -> Vec<String> {
-        let mut notes = Vec::new();
-        let blind_deg = self.view.blind_rad().to_degrees();
-        if blind_deg > 1.0 {
-            notes.push(format!(
-                "field of view limited to {:.0} degrees",
-                360.0 - blind_deg
-            ));
-        }
-        if let Some(facts) = &info.position {
-            let sentence = facts.sentence.as_deref().unwrap_or("no NMEA sentence");
-            let (packets, port, pps) = (facts.packets, facts.port, facts.pps.name());
-            notes.push(format!(
-                "{packets} position packets to port {port}, pulse per second {pps}, {sentence}"
-            ));
-        }
-        if self.candidates.len() > self.model.candidates().len() {
-            let (model, others) = (self.model.id(), self.candidates.join(", "));
-            notes.push(format!(
-                "too few packets to tell {model} from {others}: name the model with --sensor"
-            ));
-        }
-        let jumps = info.clock.segments().len().saturating_sub(1);
-        if jumps > 0 {
-            notes.push(format!("the device clock jumped {jumps} times"));
-        }
-        if self.mode_changes > 0 {
-            let changes = self.mode_changes;
-            notes.push(format!("the return mode changed {changes} times"));
-        }
-        notes.extend(info.conflict.clone());
-        notes
-    }
-}
-
 impl StreamInfo {
     fn note_silence(&mut self, last: Option<Timestamp>) {
         let silent_s = last.map_or(0.0, |last| last.seconds_since(self.last));
@@ -626,12 +312,4 @@ impl StreamInfo {
             ));
         }
     }
-}
-
-fn second_number(time: Timestamp, origin: Option<Timestamp>) -> usize {
-    let elapsed_ns = time - origin.unwrap_or(time);
-    // A broken stamp must not ask for memory without end: ten years of seconds at most would be
-    // far too many, a month is plenty.
-    const MOST: i64 = 31 * 86_400;
-    (elapsed_ns / NANOS_PER_SECOND).clamp(0, MOST) as usize
 }

@@ -11,6 +11,7 @@ pub mod interpolate;
 pub mod lidar;
 pub mod motion;
 pub mod network;
+pub mod plan;
 pub mod random;
 pub mod reference;
 pub mod rod;
@@ -20,4 +21,5 @@ pub mod solver;
 pub mod terrain;
 pub mod truth;
 
-pub use simulation::{ScenePlan, Simulation};
+pub use plan::ScenePlan;
+pub use simulation::Simulation;

@@ -2,83 +2,26 @@
 
 use std::io::{self, Write};
 
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::Vector3;
 use rayon::prelude::*;
 
-use super::blade::{Blade, BuildErrors, Orientation};
-use super::body::{Body, Pose, Saddle};
-use super::echo::{Optics, View};
-use super::lidar::{Lidar, LidarPlan, PACKET_NS};
-use super::motion::{Motion, Schedule, Sway};
-use super::network::{Arrival, Fate, NetworkPlan};
+use super::blade::Blade;
+use super::body::{Body, Pose};
+use super::echo::View;
+use super::lidar::{Lidar, PACKET_NS};
+use super::motion::Motion;
+use super::network::{Arrival, Fate};
+use super::plan::ScenePlan;
 use super::random::{Stream, Subject};
-use super::reference::Stations;
 use super::rod::Node;
 use super::sight::Sight;
-use super::solver::{Loads, Pull};
-use super::terrain::{Crate, Ground, GroundPlan, Terrain, Wall};
+use super::solver::Loads;
+use super::terrain::{Ground, Terrain};
 use super::truth::{self, SectionTruth};
 use crate::capture::PcapWriter;
 use crate::error::InvalidValue;
 use crate::packet::ReturnMode;
 use crate::packet::velodyne::{BLOCKS, CHANNELS, RawBlock, encode, puck};
-use crate::time::Timestamp;
-
-/// Where a winch pulls.
-#[derive(Debug, Clone, Copy)]
-pub struct SaddlePlan {
-    /// Arc length, metres.
-    pub s_m: f64,
-    /// Force at full load, N.
-    pub force_n: f64,
-    /// Where the cable is fixed, from the axis along chord and towards the suction side, metres.
-    pub lever_m: [f64; 2],
-    /// End of the cable at the winch, metres.
-    pub anchor_m: Vector3<f64>,
-}
-
-/// Everything that a simulated test is made of.
-#[derive(Debug, Clone)]
-pub struct ScenePlan {
-    /// Seed of all that is drawn.
-    pub seed: u64,
-    /// UTC of scene time 0.
-    pub start: Timestamp,
-    /// The drawing of the blade.
-    pub stations: Stations,
-    /// How it is clamped.
-    pub orientation: Orientation,
-    /// How far the built blade may differ.
-    pub errors: BuildErrors,
-    /// Direction of the pull, world frame.
-    pub direction: Vector3<f64>,
-    /// Whether the pull turns with the section.
-    pub follower: bool,
-    /// Pulls.
-    pub saddles: Vec<SaddlePlan>,
-    /// Whether the saddles' frames can be seen.
-    pub show_saddles: bool,
-    /// Radius of the cables, metres; 0 = none.
-    pub cable_radius_m: f64,
-    /// Load steps.
-    pub schedule: Schedule,
-    /// Modes in which the blade sways.
-    pub sways: Vec<Sway>,
-    /// Rotation of the root at full load, rad about the world axes.
-    pub root_turn_rad: Vector3<f64>,
-    /// The ground.
-    pub ground: GroundPlan,
-    /// A wall.
-    pub wall: Option<Wall>,
-    /// Boxes.
-    pub boxes: Vec<Crate>,
-    /// Sensors.
-    pub lidars: Vec<LidarPlan>,
-    /// Optics of all sensors.
-    pub optics: Optics,
-    /// The network.
-    pub network: NetworkPlan,
-}
 
 /// Distance of the solver's nodes, metres.
 const SPACING_M: f64 = 0.25;
@@ -336,77 +279,19 @@ impl States {
     }
 }
 
-impl ScenePlan {
-    fn pulls(&self, blade: &Blade, arc_m: &[f64]) -> Result<Vec<Pull>, InvalidValue> {
-        let pull = |saddle: &SaddlePlan| {
-            let node = arc_m.iter().position(|s| (s - saddle.s_m).abs() < 1e-6);
-            let node = node.filter(|node| *node > 0).ok_or_else(|| InvalidValue {
-                name: "saddles.s_m",
-                expected: format!("above 0 and up to {} m", blade.built.length_m()),
-                found: saddle.s_m.to_string(),
-            })?;
-            let (chord, normal) = blade.directions(saddle.s_m);
-            Ok(Pull {
-                node,
-                force_n: self.direction.normalize() * saddle.force_n,
-                lever_m: chord * saddle.lever_m[0] + normal * saddle.lever_m[1],
-                follower: self.follower,
-            })
-        };
-        self.saddles.iter().map(pull).collect()
-    }
-
-    /// What is seen of the saddles: frames a hand wider than the section.
-    fn frames(&self, blade: &Blade, pulls: &[Pull]) -> Vec<Saddle> {
-        let frame = |(saddle, pull): (&SaddlePlan, &Pull)| {
-            let skin = blade.skin(saddle.s_m);
-            let (chord, normal) = blade.directions(saddle.s_m);
-            let extent = |axis: &Vector3<f64>| {
-                let places = skin.iter().map(|p| axis.x * p.x + axis.y * p.y);
-                places.fold((f64::MAX, f64::MIN), |(a, b), p| (a.min(p), b.max(p)))
-            };
-            let [(a, b), (c, d)] = [extent(&chord), extent(&normal)];
-            Saddle {
-                node: pull.node,
-                middle_m: chord * (0.5 * (a + b)) + normal * (0.5 * (c + d)),
-                half_m: Vector3::new(0.5 * (b - a) + 0.15, 0.5 * (d - c) + 0.15, 0.25),
-                chord,
-                anchor_m: saddle.anchor_m,
-                cable_radius_m: self.cable_radius_m,
-            }
-        };
-        let shown = if self.show_saddles { pulls.len() } else { 0 };
-        self.saddles
-            .iter()
-            .zip(pulls)
-            .take(shown)
-            .map(frame)
-            .collect()
-    }
-}
-
-/// The rotation whose columns are where the sensor's axes point.
-///
-/// # Errors
-/// [`InvalidValue`] where the three are not a right-handed set of perpendicular directions.
-pub fn axes(columns: [Vector3<f64>; 3]) -> Result<Rotation3<f64>, InvalidValue> {
-    let [x, y, z] = columns;
-    let right = x.cross(&y).dot(&z);
-    if (right - 1.0).abs() < 1e-6 && [x, y, z].iter().all(|a| (a.norm() - 1.0).abs() < 1e-6) {
-        return Ok(Rotation3::from_basis_unchecked(&[x, y, z]));
-    }
-    Err(InvalidValue {
-        name: "lidars.axes",
-        expected: "x, y and z perpendicular, of length one and right-handed".into(),
-        found: format!("x cross y along z is {right:.3}"),
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::lidar::{Clock, MODELS};
+    use super::super::blade::{BuildErrors, Orientation};
+    use super::super::echo::Optics;
+    use super::super::lidar::{Clock, LidarPlan, MODELS};
+    use super::super::motion::Schedule;
+    use super::super::network::NetworkPlan;
+    use super::super::plan::{SaddlePlan, axes};
+    use super::super::reference::Stations;
+    use super::super::terrain::GroundPlan;
     use super::*;
     use crate::capture::DatagramReader;
+    use crate::time::Timestamp;
     use rayon::ThreadPoolBuilder;
 
     fn lidar(index: u8, z_m: f64) -> LidarPlan {
@@ -563,7 +448,7 @@ mod tests {
             if echo.range > 0 && at.y > -4.0 {
                 hits += 1;
                 assert!(
-                    simulation.from_skin_m(&states.nodes[0], &at) < 0.012,
+                    simulation.skin_distance_m(&states.nodes[0], &at) < 0.012,
                     "{at}"
                 );
             }
@@ -574,20 +459,16 @@ mod tests {
 
     impl Simulation {
         /// Distance of a point from the skin at the nearest node, found by brute force.
-        fn from_skin_m(&self, nodes: &[Node], at: &Vector3<f64>) -> f64 {
-            let near = |node: &&(usize, f64)| node.1;
+        fn skin_distance_m(&self, nodes: &[Node], at: &Vector3<f64>) -> f64 {
             let distances: Vec<(usize, f64)> = nodes
                 .iter()
                 .map(|node| (node.rotation.inverse() * (at - node.position_m)).z.abs())
                 .enumerate()
                 .collect();
-            let nearest = distances
-                .iter()
-                .min_by(|a, b| near(a).total_cmp(&near(b)))
-                .unwrap();
+            let nearest = distances.iter().min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
             let node = &nodes[nearest.0];
             let local = (node.rotation.inverse() * (at - node.position_m)).xy();
-            let skin = self.blade.skin(self.motion.arc_m[nearest.0] + 0.0);
+            let skin = self.blade.skin(self.motion.arc_m[nearest.0]);
             let sides = (0..skin.len()).map(|i| {
                 let (a, b) = (skin[i], skin[(i + 1) % skin.len()]);
                 let along = ((local - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);

@@ -8,6 +8,10 @@ use lidar_deflect_core::packet::hesai::{at128, atx, ft120, jt16, pandar, pandar1
 use lidar_deflect_core::packet::unit::UnitFile;
 use lidar_deflect_core::packet::velodyne::{self, BLOCKS, CHANNELS};
 use lidar_deflect_core::packet::{ModelRef, ReturnMode, model};
+use lidar_deflect_core::time::Timestamp;
+
+/// Writes a packet.
+pub type Encode = Box<dyn Fn(&RawPacket) -> Vec<u8>>;
 
 /// A model with what writes its packets.
 pub struct Writer {
@@ -16,7 +20,7 @@ pub struct Writer {
     pub size: (usize, usize),
     /// Modes that the packets can tell.
     pub modes: &'static [ReturnMode],
-    pub encode: Box<dyn Fn(&RawPacket) -> Vec<u8>>,
+    pub encode: Encode,
 }
 
 const SINGLE: &[ReturnMode] = &[ReturnMode::Strongest];
@@ -136,4 +140,33 @@ pub fn blocks(
         echoes: (0..size.1).map(|channel| echo(number, channel)).collect(),
     };
     (0..size.0).map(block).collect()
+}
+
+/// 2024-06-10 06:13:20.5 UTC.
+pub const START: Timestamp = Timestamp(1_718_000_000_500_000_000);
+/// Hundredths of a degree from one firing to the next.
+const STEP: u16 = 20;
+
+/// A packet with an echo wherever `echo` says so.
+pub fn packet(
+    writer: &Writer,
+    mode: ReturnMode,
+    number: u32,
+    echo: impl Fn(usize, usize) -> RawEcho,
+) -> RawPacket {
+    let firings = (writer.size.0 / mode.returns()) as u32;
+    let azimuth = |firing: usize| match writer.model.id() {
+        "ft120" => (number % 160) as u16,
+        _ => ((number * firings + firing as u32) * u32::from(STEP) % 36_000) as u16,
+    };
+    let period_ns = writer.model.period_ns(mode);
+    RawPacket {
+        time: START + i64::from(number) * period_ns / 1000 * 1000,
+        sequence: number.wrapping_add(u32::MAX - 40),
+        return_mode: mode,
+        rpm: 600.0,
+        operation: 0,
+        azimuth_state: 0,
+        blocks: blocks(writer.size, mode, azimuth, echo),
+    }
 }

@@ -18,7 +18,6 @@ use crate::error::BorderResult;
 /// Data packets are chosen by their own time, so that none of the span is missing at its end.
 #[pyfunction]
 #[pyo3(signature = (scan, out, *, lidars, start_ns=None, stop_ns=None, progress=None))]
-#[allow(clippy::needless_pass_by_value)] // Python hands over values, not borrows
 pub fn cut_capture(
     py: Python<'_>,
     scan: &CaptureScan,

@@ -130,9 +130,9 @@ fn other<'py>(py: Python<'py>, stream: &OtherStream) -> Dict<'py> {
     dict.set_item("positions", stream.positions)?;
     dict.set_item("payload_bytes", stream.payload_len)?;
     dict.set_item("rate_hz", stream.rate_hz)?;
-    let (model, why) = stream.closest.clone().unzip();
-    dict.set_item("closest_model", model)?;
-    dict.set_item("why_not", why)?;
+    let closest = stream.closest.as_ref();
+    dict.set_item("closest_model", closest.and_then(|near| near.may_be))?;
+    dict.set_item("why_not", closest.map(|near| near.why.as_str()))?;
     Ok(dict)
 }
 

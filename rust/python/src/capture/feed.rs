@@ -1,12 +1,13 @@
 //! Datagrams in blocks: the interpreter lock is free within a block; between blocks progress is told
 //! and Ctrl-C comes through.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use lidar_deflect_core::capture::{Datagram, FragmentFacts};
 use lidar_deflect_core::drops::Drops;
-use lidar_deflect_files::{CaptureSet, FileError, FileFacts};
+use lidar_deflect_core::stream::{Scan, ScanOptions};
+use lidar_deflect_files::{CaptureSet, FileError, FileFacts, tail};
 use pyo3::prelude::*;
 
 use crate::error::BorderResult;
@@ -99,4 +100,25 @@ impl Feed {
             fragments: self.set.fragments(),
         }
     }
+}
+
+/// End of the last packet of each lidar in the last records of the files, by name.
+pub fn ends(paths: &[PathBuf], options: &ScanOptions) -> Vec<(String, i64)> {
+    let lidars = paths.iter().flat_map(|path| end_of(path, options));
+    lidars.collect()
+}
+
+fn end_of(path: &Path, options: &ScanOptions) -> Vec<(String, i64)> {
+    let mut scan = Scan::new(options.clone());
+    if let Some(mut reader) = tail(path) {
+        // Damage in the tail only shortens what can be told of it.
+        while let Ok(Some(datagram)) = reader.next() {
+            scan.push(&datagram);
+        }
+    }
+    let lidars = scan.finish().lidars;
+    lidars
+        .iter()
+        .map(|lidar| (lidar.key.to_string(), lidar.last.0))
+        .collect()
 }

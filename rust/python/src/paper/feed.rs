@@ -39,7 +39,7 @@ impl FramePlan {
     #[pyo3(signature = (
         scan, *, lidars, poses, cut_azimuth_deg, box_m, first_ns, period_ns, start_ns, stop_ns
     ))]
-    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keywords of Python
+    #[allow(clippy::too_many_arguments)] // keywords of Python
     fn new(
         scan: &CaptureScan,
         lidars: Vec<usize>,
@@ -63,7 +63,6 @@ impl FramePlan {
                 cut_azimuth_rad: cuts(&lidars, &cut_azimuth_deg),
                 start: Some(Timestamp(start_ns)),
                 stop: Some(Timestamp(stop_ns)),
-                ..SweepOptions::default()
             },
             poses: poses.iter().map(pose).collect::<Result<_, _>>()?,
             lidars,

@@ -27,7 +27,7 @@ impl FrameParams {
         contour_radius_m, contour_min_points, line_degree, line_distance_m, degree_yoz, degree_xoz,
         tip_max_u_m, overhead_m
     ))]
-    #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // keywords of Python
+    #[allow(clippy::too_many_arguments)] // keywords of Python
     fn new(
         distances_m: Option<PyReadonlyArray2<'_, f64>>,
         intervals: usize,

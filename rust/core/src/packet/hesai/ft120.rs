@@ -16,7 +16,7 @@ use crate::packet::aim::wrapped;
 use crate::packet::echoes::judge;
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{
-    Counting, Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally,
+    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
 };
 
 /// Byte ranges; the tail's count from its start.
@@ -152,8 +152,9 @@ impl Model for Ft120 {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        format!("{} bytes do not fit {}", payload.len(), self.title())
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let why = format!("{} bytes do not fit {}", payload.len(), self.title());
+        Misfit { why, may_be: None }
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {

@@ -15,7 +15,7 @@ use crate::packet::aim::{add, wrapped};
 use crate::packet::echoes::{MOST, RawEcho, judge};
 use crate::packet::unit::{Fitted, UnitFile};
 use crate::packet::{
-    Counting, Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally,
+    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
 };
 use crate::time::Timestamp;
 
@@ -141,8 +141,9 @@ impl<F: Family> Model for Rotating<F> {
         self.view(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        format!("{} bytes do not fit {}", payload.len(), self.title())
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let why = format!("{} bytes do not fit {}", payload.len(), self.title());
+        Misfit { why, may_be: None }
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
@@ -196,7 +197,9 @@ impl<F: Family> Model for Rotating<F> {
                 .clone()
                 .with(std::slice::from_ref(file))
                 .is_ok(),
-            Some(Kind::Channels) | None => self.0.takes_binary(file),
+            // Packets of all 128 channels do not need it; it does no harm.
+            Some(Kind::Channels) => self.0.nominal().fire("loop2").is_some(),
+            None => self.0.takes_binary(file),
         }
     }
 

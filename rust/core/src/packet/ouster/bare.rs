@@ -7,7 +7,9 @@ use super::{OBTAIN, Span, inertial, metadata, unit};
 use crate::angle::wrap_turn;
 use crate::error::UnitError;
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Counting, Head, Model, ModelRef, PacketKind, ReturnMode, Tally, UnitFacts};
+use crate::packet::{
+    Counting, Head, Misfit, Model, ModelRef, PacketKind, ReturnMode, Tally, UnitFacts,
+};
 
 /// Any Ouster sensor.
 pub static OUSTER: Bare = Bare {
@@ -113,11 +115,15 @@ impl Model for Bare {
         guess(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        format!(
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let why = format!(
             "{} bytes without columns that follow each other",
             payload.len()
-        )
+        );
+        Misfit {
+            why,
+            may_be: Some(self.id),
+        }
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
@@ -198,7 +204,7 @@ impl Model for Bare {
             format!(
                 "those of {} with packets of {} bytes",
                 metadata.product,
-                metadata.layout.len()
+                metadata.layout.packet_len()
             )
         });
         Err(file.refuse(

@@ -100,7 +100,7 @@ impl Layout {
     }
 
     /// Bytes of a packet; the footer is as long as the header.
-    pub fn len(&self) -> usize {
+    pub fn packet_len(&self) -> usize {
         2 * self.header_len() + self.columns * self.column_len()
     }
 }
@@ -142,7 +142,7 @@ impl<'a> View<'a> {
             Header::Standard => little(bytes, header::TYPE),
             Header::Safety => little(bytes, header::safety::TYPE),
         };
-        (bytes.len() == layout.len() && kind == 1).then_some(Self { bytes, layout })
+        (bytes.len() == layout.packet_len() && kind == 1).then_some(Self { bytes, layout })
     }
 
     /// Sizes.
@@ -303,7 +303,7 @@ pub struct RawPacket {
 
 /// Writes a data packet; what is too much is left out.
 pub fn encode(layout: Layout, packet: &RawPacket) -> Vec<u8> {
-    let mut bytes = vec![0; layout.len()];
+    let mut bytes = vec![0; layout.packet_len()];
     let (frame, init_id) = (u64::from(packet.frame), u64::from(packet.init_id));
     match layout.header {
         Header::Legacy => {}
@@ -362,7 +362,7 @@ mod tests {
                 pixels,
                 pixel_len,
             }
-            .len()
+            .packet_len()
         };
         assert_eq!(len(Header::Legacy, 64, 12), 12_608);
         assert_eq!(len(Header::Standard, 128, 12), 24_832);

@@ -361,7 +361,7 @@ mod tests {
         let old = of(r#"{"lidar_mode": "2048x10", "lidar_data_format": "error: unknown", "prod_line": "OS-1-64"}"#).unwrap();
         assert_eq!((old.elevation_rad.len(), old.columns_per_turn), (64, 2048));
         assert_eq!(
-            (old.layout.len(), old.beam_origin_mm),
+            (old.layout.packet_len(), old.beam_origin_mm),
             (12_608, (12.163, 0.0))
         );
     }

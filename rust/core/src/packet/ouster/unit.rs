@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Mutex;
 
 use super::geometry::Geometry;
-use super::layout::View;
+use super::layout::{Column, View};
 use super::metadata::{self, Metadata};
 use super::{OBTAIN, Span};
 use crate::cloud::{Return, ReturnKind};
@@ -12,8 +12,8 @@ use crate::error::UnitError;
 use crate::packet::aim::wrapped;
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{
-    Counting, Decoded, Decoder, Head, Model, ModelRef, PacketKind, Place, ReturnMode, Tally,
-    UnitFacts,
+    Counting, Decoded, Decoder, Head, Misfit, Model, ModelRef, PacketKind, Place, ReturnMode,
+    Tally, UnitFacts,
 };
 
 /// Frames of the counter that all firmwares have; wider ones are cut to it.
@@ -132,9 +132,10 @@ impl Model for Unit {
         self.view(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        let (found, expected) = (payload.len(), self.metadata.layout.len());
-        format!("{found} bytes, {expected} by {}", self.file.name)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let (found, expected) = (payload.len(), self.metadata.layout.packet_len());
+        let why = format!("{found} bytes, {expected} by {}", self.file.name);
+        Misfit { why, may_be: None }
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
@@ -161,7 +162,7 @@ impl Model for Unit {
         let Some(view) = self.view(payload) else {
             return tally;
         };
-        for column in view.columns().filter(|column| column.is_valid()) {
+        for column in view.columns().filter(Column::is_valid) {
             for pixel in column.pixels() {
                 let [(one, _), (other, _)] = self.echoes(pixel);
                 let is_merged = one != 0 && one == other;

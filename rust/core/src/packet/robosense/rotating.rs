@@ -16,7 +16,7 @@ use crate::packet::aim::wrapped;
 use crate::packet::echoes::{RawEcho, judge};
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
 use crate::packet::{
-    Counting, Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally,
+    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
 };
 use turn::Turn;
 
@@ -221,12 +221,16 @@ impl<F: Family> Model for Rotating<F> {
         self.view(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
+    fn misfit(&self, payload: &[u8]) -> Misfit {
         let [old, kind, model] = super::layout::kind(payload);
-        format!(
+        let why = format!(
             "type bytes {old:#04x} {kind:#04x} {model:#04x} are not those of {}",
             self.title()
-        )
+        );
+        Misfit {
+            why,
+            may_be: Some(self.id()),
+        }
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {

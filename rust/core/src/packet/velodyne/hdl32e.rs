@@ -7,7 +7,7 @@ use super::{CHANNELS, Packet, calibration, puck};
 use crate::error::UnitError;
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Head, Model, PacketKind, ReturnMode, Tally};
+use crate::packet::{Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Time from one laser to the next.
 pub const LASER_NS: i64 = 1_152;
@@ -84,8 +84,8 @@ impl Model for Hdl32e {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        rows::misfit(payload)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {

@@ -16,7 +16,7 @@ use crate::error::UnitError;
 use crate::packet::aim::{add, turn, wrapped};
 use crate::packet::echoes::judge;
 use crate::packet::unit::{Calibration, Fitted, Gather, UnitFile};
-use crate::packet::{Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
 
 /// Lasers of one unit.
 pub const LASERS: usize = 64;
@@ -126,8 +126,8 @@ impl Model for Hdl64e {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        super::rows::misfit(payload)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
@@ -306,5 +306,63 @@ impl Decoder for Hdl64eDecoder {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn channel() -> Channel {
+        Channel {
+            laser: Laser {
+                distance_m: 1.4,
+                distance_x_m: Some(1.5),
+                distance_y_m: Some(1.3),
+                vertical_offset_m: 0.2,
+                horizontal_offset_m: 0.026,
+                focal_distance_m: 15.0,
+                focal_slope: 1.2,
+                min_intensity: 10.0,
+                ..Laser::default()
+            },
+            ring: 0,
+            delay_ns: 0,
+            rotation: (0.0, 1.0),
+            elevation: (0.0, 1.0),
+        }
+    }
+
+    #[test]
+    fn far_targets_have_one_correction_and_near_ones_one_along_each_axis() {
+        // 30 m straight ahead: the far correction alone; the horizontal offset is to the left.
+        let (xyz_m, range_m) = channel().place(15_000, (0.0, 1.0));
+        assert!((range_m - 31.4).abs() < 1e-9);
+        for (found, expected) in xyz_m.iter().zip([31.4, 0.026, 0.2]) {
+            assert!((found - expected).abs() < 1e-9, "{xyz_m:?}");
+        }
+        // Ahead at the near target of the y axis: its correction takes the far one's place.
+        let near = ((NEAR_Y_M - 1.4) / RANGE_UNIT_M).round() as u16;
+        let (xyz_m, _) = channel().place(near, (0.0, 1.0));
+        assert!(
+            (xyz_m[0] - (f64::from(near) * RANGE_UNIT_M + 1.3)).abs() < 1e-3,
+            "{xyz_m:?}"
+        );
+        // To the right, half way between the near and the far target of the x axis.
+        let half = (((NEAR_X_M + FAR_M) / 2.0 - 1.4) / RANGE_UNIT_M).round() as u16;
+        let (xyz_m, _) = channel().place(half, (1.0, 0.0));
+        assert!(
+            (xyz_m[1] + f64::from(half) * RANGE_UNIT_M + 1.45).abs() < 1e-3,
+            "{xyz_m:?}"
+        );
+    }
+
+    #[test]
+    fn brightness_grows_off_the_focus_and_stays_within_its_limits() {
+        let intensity = |range, intensity| channel().intensity(RawReturn { range, intensity });
+        let focus = (65_535.0 * 15.0 / 131.0) as u16;
+        assert_eq!(intensity(focus, 50), 50);
+        assert!(intensity(60_000, 50) > 200);
+        assert_eq!((intensity(60_000, 255), intensity(focus, 3)), (255, 10));
     }
 }

@@ -12,8 +12,8 @@ mod rows;
 pub mod vlp32;
 pub mod vls128;
 
-use crate::packet::ReturnMode;
 use crate::packet::echoes::RawEcho;
+use crate::packet::{Misfit, ReturnMode};
 
 /// Bytes of a data packet.
 pub const LEN: usize = 1206;
@@ -129,6 +129,43 @@ impl<'a> Packet<'a> {
     /// Byte of the product.
     pub fn product(&self) -> u8 {
         self.0[field::PRODUCT]
+    }
+}
+
+/// Products that send packets of this size.
+const PRODUCTS: [(u8, &str); 8] = [
+    (0x10, "a Leishen C16"),
+    (0x20, "a Leishen C32"),
+    (0x21, "a Velodyne HDL-32E"),
+    (0x22, "a Velodyne VLP-16 or Puck LITE"),
+    (0x23, "a Velodyne VLP-32A or B"),
+    (0x24, "a Velodyne Puck Hi-Res"),
+    (0x28, "a Velodyne VLP-32C"),
+    (0xA1, "a Velodyne VLS-128"),
+];
+
+/// Why a payload is not of the model `id`, which sends packets of this family.
+fn misfit(payload: &[u8], id: &'static str) -> Misfit {
+    let Some(packet) = Packet::new(payload) else {
+        let why = format!("{} bytes instead of {LEN}", payload.len());
+        return Misfit { why, may_be: None };
+    };
+    let (mode, product) = (packet.return_mode_byte(), packet.product());
+    if !packet.is_lower(0) {
+        let why = "the size fits Velodyne, the block flags do not".into();
+        return Misfit { why, may_be: None };
+    }
+    match PRODUCTS.iter().find(|(known, _)| *known == product) {
+        Some((_, name)) => Misfit {
+            why: format!("by its factory bytes (0x{mode:02x} 0x{product:02x}) {name}"),
+            may_be: None,
+        },
+        None => Misfit {
+            why: format!(
+                "the size fits Velodyne, the factory bytes (0x{mode:02x} 0x{product:02x}) do not"
+            ),
+            may_be: Some(id),
+        },
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Packet, calibration};
 use crate::error::{InvalidValue, UnitError};
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Decoder, Head, Model, PacketKind, ReturnMode, Tally};
+use crate::packet::{Decoder, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Lasers of one unit.
 pub const LASERS: usize = 16;
@@ -144,8 +144,8 @@ impl Model for Puck {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        rows::misfit(payload)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {

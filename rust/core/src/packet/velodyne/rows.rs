@@ -114,19 +114,6 @@ pub fn recognise_product(payload: &[u8], products: &[u8]) -> Option<PacketKind> 
     (is_mode && is_product && packet.is_lower(0)).then_some(PacketKind::Data)
 }
 
-/// Why a payload that fits by its size is not of a model.
-pub fn misfit(payload: &[u8]) -> String {
-    let Some(packet) = Packet::new(payload) else {
-        return format!("{} bytes instead of {}", payload.len(), super::LEN);
-    };
-    let (mode, product) = (packet.return_mode_byte(), packet.product());
-    if packet.is_lower(0) {
-        format!("the size fits Velodyne, the factory bytes (0x{mode:02x} 0x{product:02x}) do not")
-    } else {
-        "the size fits Velodyne, the block flags do not".into()
-    }
-}
-
 /// Whether the blocks of a row have the flag and an azimuth within one turn.
 fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
     let mut blocks = row * stride..(row + 1) * stride;

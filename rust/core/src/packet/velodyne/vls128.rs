@@ -16,7 +16,7 @@ use crate::angle::{wrap_half_turn, wrap_turn};
 use crate::error::{InvalidValue, UnitError};
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Decoded, Decoder, Head, Model, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
 use crate::time::Timestamp;
 
 /// Lasers of one unit.
@@ -59,7 +59,7 @@ pub static VLS128: Vls128 = Vls128;
 pub struct Vls128;
 
 impl Vls128 {
-    /// Beams of the manual; delays in slots of [`USUAL_SLOT_NS`].
+    /// Beams of the manual; delays in slots of 2.764 us.
     pub fn beams() -> Beams {
         let beam = |laser: usize| {
             let (elevation_deg, rotation_deg) = TABLE[laser];
@@ -154,8 +154,8 @@ impl Model for Vls128 {
         Packet::new(payload).is_some()
     }
 
-    fn misfit(&self, payload: &[u8]) -> String {
-        rows::misfit(payload)
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        super::misfit(payload, self.id())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {

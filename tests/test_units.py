@@ -1,0 +1,92 @@
+"""Calibration files of single units: named, found beside the capture, wrong, missing."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lidar_deflect import capture
+from lidar_deflect.errors import InvalidValueError
+
+SAMPLES = Path(__file__).parent / "data" / "packets"
+XT32 = SAMPLES / "hesai_xt32_dual.pcap"
+ANGLES = SAMPLES / "hesai_xt32_dual.angle.csv"
+SOURCE = "192.168.1.201"
+
+
+@pytest.fixture
+def alone(tmp_path: Path) -> Path:
+    """A capture without its files beside it."""
+    return Path(shutil.copy(XT32, tmp_path / "tower.pcap"))
+
+
+def points(opened: capture.Capture) -> np.ndarray:
+    return np.concatenate([sweep.xyz for sweep in opened.sweeps()])
+
+
+def test_without_a_file_the_table_is_nominal_and_info_says_how_to_get_one(alone: Path) -> None:
+    (stream,) = capture.open(alone).streams
+    assert stream.beams.startswith("nominal table, unit calibration missing: fetch")
+    assert "--beams" in stream.beams
+    assert capture.open(alone).info()["streams"][0]["beams"] == stream.beams
+
+
+def test_a_named_file_is_the_same_as_one_beside_the_capture(alone: Path) -> None:
+    named = points(capture.open(alone, beams={SOURCE: ANGLES}))
+    nominal = points(capture.open(alone))
+    shutil.copy(ANGLES, alone.with_name("tower.angle.csv"))
+    beside = capture.open(alone)
+    assert beside.streams[0].beams == "tower.angle.csv"
+    np.testing.assert_array_equal(points(beside), named)
+    assert np.abs(named - nominal).max() > 1e-3
+
+
+def test_a_named_file_counts_more_than_one_beside_the_capture(alone: Path) -> None:
+    shutil.copy(ANGLES, alone.with_name("tower.angle.csv"))
+    lines = ANGLES.read_text().splitlines()
+    turned = [lines[0]]
+    for line in lines[1:]:
+        channel, elevation, azimuth = line.split(",")
+        turned.append(f"{channel},{elevation},{float(azimuth) + 90}")
+    other = alone.with_name("other.csv")
+    other.write_text("\n".join(turned))
+    beside, named = capture.open(alone), capture.open(alone, beams={"": [other]})
+    assert named.streams[0].beams == "other.csv"
+    x, y, z = points(beside).T
+    np.testing.assert_allclose(points(named), np.column_stack([y, -x, z]), atol=1e-4)
+
+
+def test_a_file_of_another_model_is_refused(alone: Path) -> None:
+    opened = capture.open(alone, beams={SOURCE: SAMPLES / "hesai_qt128_dual.angle.csv"})
+    with pytest.raises(InvalidValueError, match=r"qt128.*PandarXT-32.*Laser id") as caught:
+        opened.scan()
+    assert caught.value.code == "beams.not_taken"
+
+
+def test_the_channel_file_of_a_qt128_may_be_named() -> None:
+    files = [SAMPLES / f"hesai_qt128_dual.{kind}.csv" for kind in ("angle", "channel_config")]
+    opened = capture.open(SAMPLES / "hesai_qt128_dual.pcap", beams={SOURCE: files})
+    assert opened.streams[0].beams.startswith("hesai_qt128_dual.angle.csv")
+
+
+def test_a_broken_file_is_told_with_its_line(alone: Path) -> None:
+    broken = alone.with_name("tower.angle.csv")
+    broken.write_text(ANGLES.read_text().replace("12,3.924965", "12,up"))
+    opened = capture.open(alone)
+    assert opened.streams[0].beams.startswith(
+        "missing: tower.angle.csv, line 13: expected a number"
+    )
+    with pytest.raises(InvalidValueError, match="line 13") as caught:
+        opened.sweeps()
+    assert caught.value.code == "beams.malformed"
+
+
+def test_a_file_that_cannot_be_read_is_told_at_once(alone: Path) -> None:
+    with pytest.raises(InvalidValueError, match="gone") as caught:
+        capture.open(alone, beams={SOURCE: "gone.csv"})
+    assert caught.value.code == "beams.unreadable"
+    with alone.with_name("huge.csv").open("wb") as huge:
+        huge.truncate(5_000_000)
+    with pytest.raises(InvalidValueError, match="5000000 bytes"):
+        capture.open(alone, beams={SOURCE: alone.with_name("huge.csv")})
