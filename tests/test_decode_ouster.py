@@ -59,9 +59,14 @@ def test_captures_decode_to_the_reference(name: str) -> None:
     allowed_m = TOLERANCE_M + FLOAT32 * np.abs(xyz)
     assert (off_m <= allowed_m).all(), f"worst {off_m.max()} m"
     np.testing.assert_array_equal(found["intensity"][order], reference["reflectivity"][other])
-    np.testing.assert_array_equal(np.rint(found["range_m"][order] * 1e3), reference["range_mm"][other])
+    np.testing.assert_array_equal(
+        np.rint(found["range_m"][order] * 1e3), reference["range_mm"][other]
+    )
     for lidar in np.unique(found["lidar"]):
         own = found["lidar"][order] == lidar
-        times, stamps = found["time_ns"][order][own], reference["timestamp_ns"][other][own].astype(int)
+        times, stamps = (
+            found["time_ns"][order][own],
+            reference["timestamp_ns"][other][own].astype(int),
+        )
         # A free clock is brought to the host's; within one turn its drift is nothing.
         assert np.ptp(times - stamps) <= 1

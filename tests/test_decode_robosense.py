@@ -43,7 +43,7 @@ def test_a_helios_16p_decodes_to_the_reference() -> None:
 
 
 def test_its_content_is_that_of_32_lasers() -> None:
-    """The unit tells 32 angles and sends twice as fast as a Helios 16P; so it is not taken for one."""
+    # The unit tells 32 angles and sends twice as fast as a Helios 16P; so it is not taken for one.
     (stream,) = capture.open(CAPTURE).streams
     assert stream.model == "helios-32"
     assert stream.rpm == pytest.approx(600, abs=1)
