@@ -70,3 +70,13 @@ def test_captures_decode_to_the_reference(name: str) -> None:
         )
         # A free clock is brought to the host's; within one turn its drift is nothing.
         assert np.ptp(times - stamps) <= 1
+
+
+def test_packets_of_accelerations_are_not_foreign() -> None:
+    path = CAPTURES / "ouster_os2_128_rng19.pcap"
+    if not path.is_file():
+        pytest.skip("the captures are not beside the project")
+    opened = capture.open(path)
+    assert dict(opened.drops) == {"companion": 10}
+    (stream,) = opened.streams
+    assert (stream.model, stream.packets, stream.lost) == ("os2", 64, 0)

@@ -45,6 +45,8 @@ struct Stream {
     position: Option<PositionFacts>,
     /// The last packet that describes a unit.
     metadata: Option<UnitFile>,
+    /// Packets that describe a unit, its motion or its state.
+    companions: u64,
 }
 
 #[derive(Debug)]
@@ -106,10 +108,11 @@ impl Scan {
         let mut others = Vec::new();
         for key in &keys {
             let stream = &self.streams[key];
+            drops.add("companion", stream.companions);
             match &stream.state {
                 State::Probing(_) => {
                     let positions = stream.position.as_ref().map_or(0, |facts| facts.packets);
-                    drops.add("foreign", stream.packets - positions);
+                    drops.add("foreign", stream.packets - positions - stream.companions);
                     drops.add("position", positions);
                     others.push(stream.describe(*key));
                 }
@@ -179,6 +182,7 @@ impl Stream {
             closest: None,
             position: None,
             metadata: None,
+            companions: 0,
         }
     }
 
@@ -216,7 +220,10 @@ impl Stream {
 
     /// Takes what is not data and yet of a lidar.
     fn take_companion(&mut self, datagram: &Datagram<'_>) -> bool {
-        match companion(datagram.payload) {
+        let kind = companion(datagram.payload);
+        let is_counted = !matches!(kind, None | Some(PacketKind::Data | PacketKind::Position));
+        self.companions += u64::from(is_counted);
+        match kind {
             Some(PacketKind::Position) => self.take_position(datagram),
             Some(PacketKind::Metadata) => {
                 let name = format!("packets to port {}", datagram.destination.port());
