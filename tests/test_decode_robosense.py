@@ -48,4 +48,5 @@ def test_its_content_is_that_of_32_lasers() -> None:
     assert stream.model == "helios-32"
     assert stream.rpm == pytest.approx(600, abs=1)
     assert (stream.packets, stream.lost, stream.return_mode) == (375, 0, "strongest")
+    assert any("helios-16p" in note and "--sensor" in note for note in stream.notes)
     assert stream.beams == "packets to port 7788"

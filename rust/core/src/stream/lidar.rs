@@ -33,6 +33,7 @@ pub struct Lidar {
     model: ModelRef,
     is_named: bool,
     candidates: Vec<&'static str>,
+    left_out: Vec<&'static str>,
     gather: Option<Box<dyn Gather>>,
     arrivals: Arrivals<Tally>,
     clock: ClockEstimator,
@@ -58,6 +59,7 @@ impl Lidar {
             model,
             is_named,
             candidates: choice.candidates,
+            left_out: choice.left_out,
             gather: model.gather(),
             arrivals: Arrivals::new(model),
             clock: ClockEstimator::default(),
@@ -306,6 +308,12 @@ impl Lidar {
             let (packets, port, pps) = (facts.packets, facts.port, facts.pps.name());
             notes.push(format!(
                 "{packets} position packets to port {port}, pulse per second {pps}, {sentence}"
+            ));
+        }
+        if !self.left_out.is_empty() {
+            let (model, others) = (self.model.id(), self.left_out.join(", "));
+            notes.push(format!(
+                "told from {others} by the ranges, not by the header: name another model than {model} with --sensor"
             ));
         }
         if self.candidates.len() > self.model.candidates().len() {

@@ -16,12 +16,18 @@ pub struct Choice {
     pub model: ModelRef,
     /// Ids of the others that it may be as well.
     pub candidates: Vec<&'static str>,
+    /// Ids of models with the same header, left out for what the packets hold.
+    pub left_out: Vec<&'static str>,
 }
 
 impl Choice {
     fn one(model: ModelRef) -> Self {
         let candidates = model.candidates().to_vec();
-        Self { model, candidates }
+        Self {
+            model,
+            candidates,
+            left_out: Vec::new(),
+        }
     }
 
     fn among(models: &[ModelRef]) -> Option<Self> {
@@ -93,7 +99,9 @@ impl Probe {
         let claimants = self.suited();
         let is_sure = |model: &&ModelRef| self.own(**model).all(|payload| model.is_sure(payload));
         if let Some(model) = claimants.iter().find(is_sure) {
-            return Some(Choice::one(*model));
+            let mut choice = Choice::one(*model);
+            choice.left_out = self.left_out(&claimants);
+            return Some(choice);
         }
         let errors: Vec<Option<f64>> = claimants.iter().map(|m| self.period_error(*m)).collect();
         if errors.iter().all(Option::is_none) {
@@ -127,6 +135,13 @@ impl Probe {
             ([only], _) | ([], [only]) => Some(*only),
             _ => None,
         }
+    }
+
+    /// Ids of the claimants that are not among the suited ones.
+    fn left_out(&self, suited: &[ModelRef]) -> Vec<&'static str> {
+        let ids = self.claimants().into_iter().map(|model| model.id());
+        ids.filter(|id| suited.iter().all(|model| model.id() != *id))
+            .collect()
     }
 
     /// Claimants whose packets, taken together, look like theirs; all of them where none do.
