@@ -8,7 +8,9 @@ pub mod aim;
 pub mod beams;
 pub mod echoes;
 pub mod hesai;
+pub mod ouster;
 pub mod proof;
+pub mod robosense;
 pub mod unit;
 pub mod velodyne;
 
@@ -17,7 +19,7 @@ use crate::cloud::Return;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
 use crate::time::{NANOS_PER_HOUR, Timestamp};
-use unit::{Fitted, Gather, UnitFile};
+use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
 /// A registered sensor model.
 pub type ModelRef = &'static dyn Model;
@@ -49,6 +51,27 @@ pub static MODELS: &[ModelRef] = &[
     &hesai::atx::ATX,
     &hesai::ft120::FT120,
     &hesai::jt16::JT16,
+    &ouster::bare::OUSTER,
+    &ouster::bare::OS0,
+    &ouster::bare::OS1,
+    &ouster::bare::OS2,
+    &ouster::bare::OSDOME,
+    &robosense::helios::HELIOS_32,
+    &robosense::helios::HELIOS_16P,
+    &robosense::helios::HELIOS_32_31DEG,
+    &robosense::helios::HELIOS_32_26DEG,
+    &robosense::rs::RS_16,
+    &robosense::rs::RS_32,
+    &robosense::bpearl::BPEARL,
+    &robosense::bpearl::BPEARL_4,
+    &robosense::ruby::RUBY_128,
+    &robosense::ruby::RUBY_80,
+    &robosense::ruby::RUBY_48,
+    &robosense::ruby::PLUS_128,
+    &robosense::ruby::PLUS_80,
+    &robosense::ruby::PLUS_48,
+    &robosense::airy::AIRY,
+    &robosense::airy::FAIRY,
 ];
 
 /// What the library must know of one sensor model.
@@ -70,6 +93,11 @@ pub trait Model: Sync + std::fmt::Debug {
     /// Whether the identifying bytes are this model's alone, so that the packet period need not
     /// confirm what [`Model::recognise`] says.
     fn is_sure(&self, _payload: &[u8]) -> bool {
+        true
+    }
+
+    /// Whether all data packets of a stream, taken together, may be of this model.
+    fn suits(&self, _packets: &[&[u8]]) -> bool {
         true
     }
 
@@ -95,6 +123,28 @@ pub trait Model: Sync + std::fmt::Debug {
             clock_wrap_ns: Some(NANOS_PER_HOUR),
             sequence_bits: None,
         }
+    }
+
+    /// The sequence number starts again after so many.
+    fn sequence_wrap(&self) -> Option<i64> {
+        let bits = self.counting().sequence_bits;
+        bits.map(|bits| 1_i64 << bits.min(62))
+    }
+
+    /// Models of the single units that `files` describe, where packets mean nothing without: those that are
+    /// sure of their packets, then those that take any of the size.
+    fn units(&self, _files: &[UnitFile]) -> Vec<ModelRef> {
+        Vec::new()
+    }
+
+    /// Whether a user who names this model may mean that unit.
+    fn covers(&self, _unit: ModelRef) -> bool {
+        false
+    }
+
+    /// What `files` tell of the unit beside its angles.
+    fn describe(&self, _files: &[UnitFile]) -> UnitFacts {
+        UnitFacts::default()
     }
 
     /// Whether `file` describes a unit of this model, judged by its content.
@@ -126,6 +176,8 @@ pub enum PacketKind {
     Metadata,
     /// Accelerations and turn rates.
     Inertial,
+    /// Tells the state of the sensor or of what it watches.
+    Status,
 }
 
 /// How a sensor numbers and stamps its packets.
@@ -373,6 +425,11 @@ pub fn model(id: &str) -> Result<ModelRef, InvalidValue> {
 pub fn claimants(payload: &[u8]) -> impl Iterator<Item = ModelRef> + '_ {
     let claims = |model: &ModelRef| model.recognise(payload) == Some(PacketKind::Data);
     MODELS.iter().copied().filter(claims)
+}
+
+/// Models of the single units that `files` describe.
+pub fn unit_models(files: &[UnitFile]) -> Vec<ModelRef> {
+    MODELS.iter().flat_map(|model| model.units(files)).collect()
 }
 
 /// What `payload` is beside data, if any model knows.

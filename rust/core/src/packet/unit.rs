@@ -110,6 +110,15 @@ impl Calibration {
     }
 }
 
+/// What files or packets of a unit tell beside its angles.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct UnitFacts {
+    /// Word for its return mode, where data packets do not tell it.
+    pub return_mode: Option<&'static str>,
+    /// What else a user should know.
+    pub notes: Vec<String>,
+}
+
 /// A decoder for one unit.
 pub struct Fitted {
     /// It.

@@ -108,11 +108,10 @@ const CLOCK_SET_NS: i64 = 500_000_000;
 impl<T> Arrivals<T> {
     pub fn new(model: ModelRef) -> Self {
         let counting = model.counting();
-        let sequence_wrap = counting.sequence_bits.map(|bits| 1_i64 << bits.min(62));
         Self {
             model,
             clock: Unroller::new(counting.clock_wrap_ns),
-            sequence: sequence_wrap.map(|wrap| Unroller::new(Some(wrap))),
+            sequence: model.sequence_wrap().map(|wrap| Unroller::new(Some(wrap))),
             order: None,
             period_ns: 1,
             packets: 0,

@@ -33,6 +33,7 @@ pub struct Lidar {
     model: ModelRef,
     is_named: bool,
     candidates: Vec<&'static str>,
+    left_out: Vec<&'static str>,
     gather: Option<Box<dyn Gather>>,
     arrivals: Arrivals<Tally>,
     clock: ClockEstimator,
@@ -58,6 +59,7 @@ impl Lidar {
             model,
             is_named,
             candidates: choice.candidates,
+            left_out: choice.left_out,
             gather: model.gather(),
             arrivals: Arrivals::new(model),
             clock: ClockEstimator::default(),
@@ -279,7 +281,10 @@ impl Lidar {
         let room = ((to - from) as f64 / period_ns).max(1.0);
         let arrived = self.counts.packets + self.clashing;
         let is_crowded = self.clashing >= 16 && self.clashing * 20 > arrived
-            || self.counts.packets >= 32 && self.counts.packets as f64 > CROWDED * room;
+            // Numbers that follow each other are one sensor's, whatever its model makes of the time.
+            || head.sequence.is_none()
+                && self.counts.packets >= 32
+                && self.counts.packets as f64 > CROWDED * room;
         let is_jump_free = self.last?.segment == 0;
         (is_crowded && (is_jump_free || self.clashing > 0)).then(|| {
             format!(
@@ -303,6 +308,12 @@ impl Lidar {
             let (packets, port, pps) = (facts.packets, facts.port, facts.pps.name());
             notes.push(format!(
                 "{packets} position packets to port {port}, pulse per second {pps}, {sentence}"
+            ));
+        }
+        if !self.left_out.is_empty() {
+            let (model, others) = (self.model.id(), self.left_out.join(", "));
+            notes.push(format!(
+                "told from {others} by the ranges, not by the header: name another model than {model} with --sensor"
             ));
         }
         if self.candidates.len() > self.model.candidates().len() {

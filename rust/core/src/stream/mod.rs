@@ -17,8 +17,8 @@ use std::net::{IpAddr, SocketAddr};
 
 use crate::capture::Datagram;
 use crate::error::InvalidValue;
-use crate::packet::ModelRef;
 use crate::packet::unit::UnitFile;
+use crate::packet::{ModelRef, unit_models};
 
 pub use cut::CaptureCut;
 pub use points::{PointBlock, PointReader, PointTagger};
@@ -135,6 +135,12 @@ impl ScanOptions {
     pub fn unit_files(&self, key: &StreamKey) -> Vec<UnitFile> {
         let files = self.units.iter().filter(|given| given.is_for(key));
         files.map(|given| given.file.clone()).collect()
+    }
+
+    /// What tells the model of a stream.
+    fn probe(&self, key: &StreamKey) -> probe::Probe {
+        let units = unit_models(&self.unit_files(key));
+        probe::Probe::new(self.named_model(key), units)
     }
 
     /// The model that the user named for a stream.

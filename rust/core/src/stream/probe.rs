@@ -16,12 +16,18 @@ pub struct Choice {
     pub model: ModelRef,
     /// Ids of the others that it may be as well.
     pub candidates: Vec<&'static str>,
+    /// Ids of models with the same header, left out for what the packets hold.
+    pub left_out: Vec<&'static str>,
 }
 
 impl Choice {
     fn one(model: ModelRef) -> Self {
         let candidates = model.candidates().to_vec();
-        Self { model, candidates }
+        Self {
+            model,
+            candidates,
+            left_out: Vec::new(),
+        }
     }
 
     fn among(models: &[ModelRef]) -> Option<Self> {
@@ -39,14 +45,18 @@ impl Choice {
 pub struct Probe {
     packets: Vec<(Timestamp, Vec<u8>)>,
     named: Option<ModelRef>,
+    /// Single units that the user's files describe.
+    units: Vec<ModelRef>,
 }
 
 impl Probe {
-    /// `named` is the model that the user gave.
-    pub fn new(named: Option<ModelRef>) -> Self {
+    /// `named` is the model that the user gave, `units` are the single units that files describe.
+    pub fn new(named: Option<ModelRef>, mut units: Vec<ModelRef>) -> Self {
+        units.retain(|unit| named.is_none_or(|named| named.covers(*unit)));
         Self {
             packets: Vec::new(),
             named,
+            units,
         }
     }
 
@@ -61,6 +71,8 @@ impl Probe {
             Some(model) => model.fits(payload),
             None => claimants(payload).next().is_some(),
         };
+        let is_unit = |unit: &ModelRef| unit.recognise(payload) == Some(PacketKind::Data);
+        let is_claimed = is_claimed || self.units.iter().any(is_unit);
         if is_claimed {
             self.packets.push((arrival, payload.to_vec()));
         }
@@ -78,13 +90,18 @@ impl Probe {
     /// that do the nearest is taken. Where there are too few packets to tell, all are candidates.
     pub fn decide(&self) -> Option<Choice> {
         self.packets.first()?;
+        if let Some(unit) = self.unit() {
+            return Some(Choice::one(unit));
+        }
         if let Some(model) = self.named {
             return Some(Choice::one(model));
         }
-        let claimants = self.claimants();
+        let claimants = self.suited();
         let is_sure = |model: &&ModelRef| self.own(**model).all(|payload| model.is_sure(payload));
         if let Some(model) = claimants.iter().find(is_sure) {
-            return Some(Choice::one(*model));
+            let mut choice = Choice::one(*model);
+            choice.left_out = self.left_out(&claimants);
+            return Some(choice);
         }
         let errors: Vec<Option<f64>> = claimants.iter().map(|m| self.period_error(*m)).collect();
         if errors.iter().all(Option::is_none) {
@@ -97,6 +114,42 @@ impl Probe {
         let fitting = known.filter(|(_, error)| *error < PERIOD_TOLERANCE);
         let nearest = fitting.min_by(|(_, one), (_, other)| one.total_cmp(other));
         nearest.map(|(model, _)| Choice::one(model))
+    }
+
+    /// The single unit whose packets these are: the only one that is sure of them, else the only one that
+    /// takes them at all.
+    fn unit(&self) -> Option<ModelRef> {
+        let most = self
+            .units
+            .iter()
+            .map(|unit| self.own(*unit).count())
+            .max()?;
+        let takes = |unit: &&ModelRef| most > 0 && self.own(**unit).count() == most;
+        let is_sure = |unit: &ModelRef| self.own(*unit).all(|payload| unit.is_sure(payload));
+        let (sure, other): (Vec<ModelRef>, Vec<ModelRef>) = self
+            .units
+            .iter()
+            .filter(takes)
+            .partition(|unit| is_sure(unit));
+        match (&sure[..], &other[..]) {
+            ([only], _) | ([], [only]) => Some(*only),
+            _ => None,
+        }
+    }
+
+    /// Ids of the claimants that are not among the suited ones.
+    fn left_out(&self, suited: &[ModelRef]) -> Vec<&'static str> {
+        let ids = self.claimants().into_iter().map(|model| model.id());
+        ids.filter(|id| suited.iter().all(|model| model.id() != *id))
+            .collect()
+    }
+
+    /// Claimants whose packets, taken together, look like theirs; all of them where none do.
+    fn suited(&self) -> Vec<ModelRef> {
+        let claimants = self.claimants();
+        let suits = |model: &&ModelRef| model.suits(&self.own(**model).collect::<Vec<_>>());
+        let suited: Vec<ModelRef> = claimants.iter().filter(suits).copied().collect();
+        if suited.is_empty() { claimants } else { suited }
     }
 
     /// Models that claim the most of the packets: a stray one does not count.

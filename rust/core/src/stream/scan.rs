@@ -10,7 +10,7 @@ use crate::capture::Datagram;
 use crate::drops::Drops;
 use crate::packet::unit::UnitFile;
 use crate::packet::velodyne::position::{Position, Pps};
-use crate::packet::{Misfit, ModelRef, PacketKind, closest, companion};
+use crate::packet::{Misfit, PacketKind, closest, companion};
 use crate::time::{NANOS_PER_SECOND, Timestamp};
 
 /// Silence of the whole capture for longer than this is a pause of the recording, not loss.
@@ -45,6 +45,8 @@ struct Stream {
     position: Option<PositionFacts>,
     /// The last packet that describes a unit.
     metadata: Option<UnitFile>,
+    /// Packets that describe a unit, its motion or its state.
+    companions: u64,
 }
 
 #[derive(Debug)]
@@ -77,7 +79,7 @@ impl Scan {
         }
         let options = &self.options;
         let stream = self.streams.entry(key);
-        let stream = stream.or_insert_with(|| Stream::new(options.named_model(&key), datagram));
+        let stream = stream.or_insert_with(|| Stream::new(options.probe(&key), datagram));
         stream.push(datagram, &mut self.shared);
     }
 
@@ -106,10 +108,11 @@ impl Scan {
         let mut others = Vec::new();
         for key in &keys {
             let stream = &self.streams[key];
+            drops.add("companion", stream.companions);
             match &stream.state {
                 State::Probing(_) => {
                     let positions = stream.position.as_ref().map_or(0, |facts| facts.packets);
-                    drops.add("foreign", stream.packets - positions);
+                    drops.add("foreign", stream.packets - positions - stream.companions);
                     drops.add("position", positions);
                     others.push(stream.describe(*key));
                 }
@@ -148,6 +151,9 @@ impl Scan {
         files.extend(lidar.gathered());
         files.retain(|file| info.model.takes(file));
         info.calibration = info.model.fit(&files).map(|fitted| fitted.calibration);
+        let facts = info.model.describe(&files);
+        info.return_mode = facts.return_mode.unwrap_or(info.return_mode);
+        info.notes.extend(facts.notes);
         info.unit = files;
         info
     }
@@ -164,9 +170,9 @@ impl Scan {
 }
 
 impl Stream {
-    fn new(named: Option<ModelRef>, datagram: &Datagram<'_>) -> Self {
+    fn new(probe: Probe, datagram: &Datagram<'_>) -> Self {
         Self {
-            state: State::Probing(Probe::new(named)),
+            state: State::Probing(probe),
             packets: 0,
             foreign: 0,
             early_foreign: Vec::new(),
@@ -176,6 +182,7 @@ impl Stream {
             closest: None,
             position: None,
             metadata: None,
+            companions: 0,
         }
     }
 
@@ -213,14 +220,17 @@ impl Stream {
 
     /// Takes what is not data and yet of a lidar.
     fn take_companion(&mut self, datagram: &Datagram<'_>) -> bool {
-        match companion(datagram.payload) {
+        let kind = companion(datagram.payload);
+        let is_counted = !matches!(kind, None | Some(PacketKind::Data | PacketKind::Position));
+        self.companions += u64::from(is_counted);
+        match kind {
             Some(PacketKind::Position) => self.take_position(datagram),
             Some(PacketKind::Metadata) => {
                 let name = format!("packets to port {}", datagram.destination.port());
                 self.metadata = Some(UnitFile::new(name, datagram.payload));
                 true
             }
-            Some(PacketKind::Inertial) => true,
+            Some(PacketKind::Inertial | PacketKind::Status) => true,
             _ => false,
         }
     }

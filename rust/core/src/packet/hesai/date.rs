@@ -45,6 +45,14 @@ pub fn bytes(time: Timestamp) -> ([u8; 6], u32) {
     )
 }
 
+/// Nanoseconds since 1970 of a year and month, day, hour, minute, second; missing ones count as 0.
+pub fn calendar_ns(year: i64, rest: &[u8]) -> i64 {
+    let number = |place: usize| rest.get(place).map_or(0, |byte| i64::from(*byte));
+    let seconds =
+        days(year, number(0), number(1)) * DAY_S + number(2) * 3600 + number(3) * 60 + number(4);
+    seconds.saturating_mul(NANOS_PER_SECOND)
+}
+
 /// Days since 1970 of a date of the Gregorian calendar; March is the first month of its year.
 fn days(year: i64, month: i64, day: i64) -> i64 {
     let year = year - i64::from(month <= 2);

@@ -1,0 +1,455 @@
+//! Decoding and encoding of all models that spin: blocks of channels, each at one azimuth.
+//!
+//! The packet's time is that of the first laser of its first block. A point's azimuth is the block's, plus
+//! what the rotor turns until the laser fires, plus the laser's own.
+
+mod turn;
+
+use std::f64::consts::TAU;
+use std::fmt::Debug;
+
+use super::difop::{self, Angles, Difop};
+use super::layout::{Layout, RawPacket, View, encode};
+use crate::cloud::Return;
+use crate::error::UnitError;
+use crate::packet::aim::wrapped;
+use crate::packet::echoes::{RawEcho, judge};
+use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
+use crate::packet::{
+    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
+};
+use turn::Turn;
+
+/// How to get the angles of a unit.
+pub const OBTAIN: &str = "record the packets that describe the unit as well (DIFOP, port 7788, about one a second), or give a \
+    capture that has one: --beams ADDRESS=FILE";
+
+/// Accelerations and turn rates of Airy and Fairy.
+const INERTIAL_LEN: usize = 51;
+const INERTIAL_ID: [u8; 4] = [0xAA, 0x55, 0x5A, 0x05];
+
+/// Ranges are whole units, limits are not exact in binary.
+const GUARD_M: f64 = 1e-6;
+
+/// What a channel of a block is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Slot {
+    /// Number of the laser.
+    pub laser: usize,
+    /// Which shot of the laser within the firing.
+    pub shot: usize,
+    /// Which return of the shot.
+    pub echo: usize,
+    /// Delay after the first shot of the firing.
+    pub delay_ns: i64,
+}
+
+/// Where the lasers leave: distance from the axis and height.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// From the axis, metres.
+    pub out_m: f64,
+    /// Above the origin, metres.
+    pub up_m: f64,
+}
+
+/// What the models differ in.
+pub trait Family: Send + Sync + Debug + Copy + 'static {
+    /// Product name in lower case without the vendor.
+    fn id(&self) -> &'static str;
+
+    /// Name with vendor, for people.
+    fn title(&self) -> &'static str;
+
+    /// Ids of models whose packets cannot be told from this one's.
+    fn candidates(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    /// Layout of its packets.
+    fn layout(&self) -> Layout;
+
+    /// Whether a packet of this layout says that it is of this model.
+    fn is_own(&self, payload: &[u8]) -> bool;
+
+    /// Whether all packets of a stream, taken together, may be of this model.
+    fn suits(&self, _packets: &[&[u8]]) -> bool {
+        true
+    }
+
+    /// Number of lasers.
+    fn lasers(&self) -> usize;
+
+    /// Returns of a shot in this packet.
+    fn returns(&self, view: &View<'_>) -> usize;
+
+    /// Blocks of one firing.
+    fn blocks_of_firing(&self, returns: usize) -> usize;
+
+    /// Time from one firing to the next.
+    fn firing_ns(&self, returns: usize) -> f64;
+
+    /// What a channel is, in the block at this place of its firing.
+    fn slot(&self, returns: usize, place: usize, channel: usize) -> Slot;
+
+    /// Whether what the rotor turns until a shot counts in whole hundredths of a degree.
+    fn is_on_grid(&self) -> bool {
+        false
+    }
+
+    /// Metres of one unit of range.
+    fn unit_m(&self, view: &View<'_>) -> f64;
+
+    /// Where the lasers leave.
+    fn lens(&self) -> Lens;
+
+    /// Ranges up to the first and beyond the second are none, metres: the maker's limits; up to the first
+    /// sensors write it for echoes of their own cover.
+    fn limits_m(&self) -> (f64, f64);
+
+    /// Angles of a unit that is not known, where single units are near them.
+    fn nominal(&self) -> Option<Angles>;
+
+    /// Angles that a unit tells.
+    fn told(&self, difop: &Difop<'_>) -> Option<Angles>;
+
+    /// Meaning of the return mode byte.
+    fn mode(&self, byte: u8) -> Option<ReturnMode>;
+
+    /// Width of the packet counter, where there is one.
+    fn counter_bits(&self) -> Option<u32> {
+        self.layout().counter.map(|_| 32)
+    }
+}
+
+/// A model that spins.
+#[derive(Debug)]
+pub struct Rotating<F>(pub F);
+
+/// The echoes of one shot.
+#[derive(Debug, Clone, Copy, Default)]
+struct Shot {
+    firing: usize,
+    slot: Slot,
+    echoes: [RawEcho; 2],
+    blocks: [usize; 2],
+}
+
+impl<F: Family> Rotating<F> {
+    fn view<'a>(&self, payload: &'a [u8]) -> Option<View<'a>> {
+        View::new(payload, self.0.layout())
+    }
+
+    /// Writes a data packet.
+    pub fn encode(&self, packet: &RawPacket) -> Vec<u8> {
+        encode(&self.0.layout(), packet)
+    }
+
+    fn return_mode(&self, view: &View<'_>) -> ReturnMode {
+        match self.0.returns(view) {
+            1 => ReturnMode::Strongest,
+            _ => ReturnMode::Dual,
+        }
+    }
+}
+
+/// Visits all shots with an echo in the order of firings and slots.
+fn visit<F: Family>(family: &F, view: &View<'_>, turn: &Turn, mut take: impl FnMut(&Shot)) {
+    let returns = family.returns(view);
+    let unit_m = family.unit_m(view);
+    let (least_m, most_m) = family.limits_m();
+    let cut = |mut echo: RawEcho| {
+        let range_m = f64::from(echo.range) * unit_m;
+        let is_within = range_m > least_m + GUARD_M && range_m <= most_m + GUARD_M;
+        if !is_within {
+            echo.range = 0;
+        }
+        echo
+    };
+    let channels = view.layout().channels;
+    let mut shots: Vec<Shot> = Vec::new();
+    for firing in 0..turn.firings() {
+        shots.clear();
+        shots.resize(2 * family.lasers(), Shot::default());
+        for (block, place) in turn.blocks_of(firing) {
+            for channel in 0..channels {
+                let slot = family.slot(returns, place, channel);
+                let number = slot.shot * family.lasers() + slot.laser;
+                let (Some(shot), true) = (shots.get_mut(number), slot.echo < 2) else {
+                    continue;
+                };
+                shot.firing = firing;
+                shot.slot = slot;
+                shot.echoes[slot.echo] = cut(view.echo(block, channel));
+                shot.blocks[slot.echo] = block;
+            }
+        }
+        let is_echo = |shot: &&Shot| shot.echoes.iter().any(|echo| echo.range != 0);
+        shots.iter().filter(is_echo).for_each(&mut take);
+    }
+}
+
+impl<F: Family> Model for Rotating<F> {
+    fn id(&self) -> &'static str {
+        self.0.id()
+    }
+
+    fn title(&self) -> &'static str {
+        self.0.title()
+    }
+
+    fn candidates(&self) -> &'static [&'static str] {
+        self.0.candidates()
+    }
+
+    fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
+        if Difop::new(payload).is_some() {
+            return Some(PacketKind::Metadata);
+        }
+        if payload.len() == INERTIAL_LEN && payload.starts_with(&INERTIAL_ID) {
+            return Some(PacketKind::Inertial);
+        }
+        let is_own = self.view(payload).is_some() && self.0.is_own(payload);
+        is_own.then_some(PacketKind::Data)
+    }
+
+    fn suits(&self, packets: &[&[u8]]) -> bool {
+        self.0.suits(packets)
+    }
+
+    fn fits(&self, payload: &[u8]) -> bool {
+        self.view(payload).is_some()
+    }
+
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let [old, kind, model] = super::layout::kind(payload);
+        let why = format!(
+            "type bytes {old:#04x} {kind:#04x} {model:#04x} are not those of {}",
+            self.title()
+        );
+        Misfit {
+            why,
+            may_be: Some(self.id()),
+        }
+    }
+
+    fn head(&self, payload: &[u8]) -> Option<Head> {
+        let view = self.view(payload)?;
+        let turn = Turn::of(&self.0, &view, 0.0);
+        Some(Head {
+            device_ns: view.time_ns(),
+            sequence: view.counter(),
+            azimuth_rad: turn.azimuth_rad(0),
+            turned_rad: turn.turned_rad(),
+            rate_rad_per_ns: turn.rate_rad_per_ns(),
+            duration_ns: turn.duration_ns(),
+            left_out: turn.left_out(),
+            return_mode: self.return_mode(&view),
+        })
+    }
+
+    fn tally(&self, payload: &[u8]) -> Tally {
+        let mut tally = Tally::default();
+        let Some(view) = self.view(payload) else {
+            return tally;
+        };
+        let turn = Turn::of(&self.0, &view, 0.0);
+        visit(&self.0, &view, &turn, |shot| {
+            let [one, other] = shot.echoes;
+            tally.add_pair(one.range, other.range);
+        });
+        tally
+    }
+
+    fn period_ns(&self, mode: ReturnMode) -> i64 {
+        let returns = mode.returns().min(2);
+        let firings = self.0.layout().blocks as f64 / self.0.blocks_of_firing(returns) as f64;
+        (firings * self.0.firing_ns(returns)).round() as i64
+    }
+
+    fn counting(&self) -> Counting {
+        Counting {
+            clock_wrap_ns: None,
+            sequence_bits: self.0.counter_bits(),
+        }
+    }
+
+    fn takes(&self, file: &UnitFile) -> bool {
+        difop::packet(file).is_some()
+    }
+
+    fn describe(&self, files: &[UnitFile]) -> UnitFacts {
+        let Some(bytes) = files.iter().find_map(difop::packet) else {
+            return UnitFacts {
+                return_mode: None,
+                notes: vec![
+                    "no packet describes the unit: which return a single one is cannot be told"
+                        .into(),
+                ],
+            };
+        };
+        let Some(difop) = Difop::new(&bytes) else {
+            return UnitFacts::default();
+        };
+        let (serial, rpm, clock) = (difop.serial(), difop.rpm(), difop.clock());
+        let blank = self.0.told(&difop).is_none();
+        let mut notes = vec![format!(
+            "serial number {serial}, set to {rpm} rpm, clock source: {clock}"
+        )];
+        notes.extend(blank.then(|| "the unit describes itself without angles".into()));
+        UnitFacts {
+            return_mode: self.0.mode(difop.return_mode()).map(ReturnMode::name),
+            notes,
+        }
+    }
+
+    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
+        let packets = files
+            .iter()
+            .filter_map(|file| Some((file, difop::packet(file)?)));
+        let told = packets.filter_map(|(file, bytes)| {
+            let difop = Difop::new(&bytes)?;
+            let settings = Settings {
+                mode: self.0.mode(difop.return_mode()),
+                rpm: Some(difop.rpm()),
+            };
+            Some((file, self.0.told(&difop)?, settings))
+        });
+        let (angles, settings, calibration) = match told.into_iter().next() {
+            Some((file, angles, settings)) => (
+                angles,
+                settings,
+                Calibration::of(&[file], Calibration::Factory),
+            ),
+            None => {
+                let angles = self.0.nominal().ok_or(UnitError::Missing {
+                    model: self.0.title(),
+                    obtain: OBTAIN,
+                })?;
+                (
+                    angles,
+                    Settings::default(),
+                    Calibration::Nominal { obtain: OBTAIN },
+                )
+            }
+        };
+        Ok(Fitted {
+            decoder: Box::new(RotatingDecoder::new(self.0, &angles, settings)),
+            calibration,
+        })
+    }
+}
+
+/// What a unit is set to, where it says so.
+#[derive(Debug, Clone, Copy, Default)]
+struct Settings {
+    mode: Option<ReturnMode>,
+    rpm: Option<u16>,
+}
+
+/// One laser.
+#[derive(Debug, Clone, Copy)]
+struct Laser {
+    ring: u16,
+    elevation: (f64, f64),
+    azimuth_rad: f64,
+}
+
+struct RotatingDecoder<F> {
+    family: F,
+    lasers: Vec<Laser>,
+    settings: Settings,
+}
+
+impl<F: Family> RotatingDecoder<F> {
+    fn new(family: F, angles: &Angles, settings: Settings) -> Self {
+        let elevations = &angles.elevation_rad;
+        // Rings count from the lowest laser; of equal ones the first is lower.
+        let ring = |laser: usize| {
+            let below = |other: &usize| {
+                let order = elevations[*other].total_cmp(&elevations[laser]);
+                order.is_lt() || order.is_eq() && *other < laser
+            };
+            (0..elevations.len()).filter(below).count() as u16
+        };
+        let lasers = elevations.iter().zip(&angles.azimuth_rad).enumerate();
+        let lasers = lasers.map(|(laser, (elevation_rad, azimuth_rad))| Laser {
+            ring: ring(laser),
+            elevation: elevation_rad.sin_cos(),
+            azimuth_rad: *azimuth_rad,
+        });
+        Self {
+            family,
+            lasers: lasers.collect(),
+            settings,
+        }
+    }
+
+    /// The mode of a packet: what the unit says, unless the packet has another number of returns.
+    fn mode_of(&self, returns: usize) -> ReturnMode {
+        let told = self.settings.mode.filter(|mode| mode.returns() == returns);
+        told.unwrap_or(match returns {
+            1 => ReturnMode::Strongest,
+            _ => ReturnMode::Dual,
+        })
+    }
+
+    fn position(&self, laser: &Laser, range_m: f64, azimuth_rad: f64) -> [f32; 3] {
+        let lens = self.family.lens();
+        let (sin, cos) = azimuth_rad.sin_cos();
+        let (sin_own, cos_own) = (azimuth_rad + laser.azimuth_rad).sin_cos();
+        let (up, level) = laser.elevation;
+        let ahead = range_m * level * cos_own + lens.out_m * cos;
+        let right = range_m * level * sin_own + lens.out_m * sin;
+        [
+            ahead as f32,
+            -right as f32,
+            (range_m * up + lens.up_m) as f32,
+        ]
+    }
+}
+
+impl<F: Family> Decoder for RotatingDecoder<F> {
+    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
+        let Some(view) = View::new(payload, self.family.layout()) else {
+            return out.drops.add("packet_size", 1);
+        };
+        out.drops.add(
+            "block_invalid",
+            (view.layout().blocks - view.blocks()) as u64,
+        );
+        let turn = Turn::of(&self.family, &view, place.mean_rate_rad_per_ns);
+        let turn = turn.with_speed(self.settings.rpm);
+        let (unit_m, mode) = (
+            self.family.unit_m(&view),
+            self.mode_of(self.family.returns(&view)),
+        );
+        visit(&self.family, &view, &turn, |shot| {
+            let Some(laser) = self.lasers.get(shot.slot.laser) else {
+                return;
+            };
+            let encoder_rad = turn.azimuth_rad(shot.firing);
+            let azimuth_rad = encoder_rad + turn.turned_until(shot.firing, shot.slot.delay_ns);
+            let (kinds, merged) = judge(mode, &shot.echoes);
+            out.merged += u64::from(merged);
+            for (index, kind) in kinds.iter().enumerate().take(2) {
+                let Some(kind) = kind else { continue };
+                let echo = shot.echoes[index];
+                let range_m = f64::from(echo.range) * unit_m;
+                out.returns.push(Return {
+                    xyz_m: self.position(laser, range_m, azimuth_rad),
+                    time: place.time + turn.start_ns(shot.firing) + shot.slot.delay_ns,
+                    range_m: range_m as f32,
+                    azimuth_rad: wrapped((azimuth_rad + laser.azimuth_rad).rem_euclid(TAU)),
+                    ring: laser.ring,
+                    intensity: echo.intensity.into(),
+                    return_index: index as u8,
+                    return_kind: *kind,
+                    packet: place.packet,
+                    block: shot.blocks[index] as u16,
+                });
+                out.encoder_rad.push(wrapped(encoder_rad));
+            }
+        });
+    }
+}

@@ -1,0 +1,208 @@
+//! How the rotor turns within one packet: firings, their azimuths and times, and a gap of the view.
+
+use std::f64::consts::{PI, TAU};
+
+use super::Family;
+use crate::packet::LeftOut;
+use crate::packet::robosense::layout::View;
+
+const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
+/// No packet has more blocks.
+const MOST: usize = 16;
+/// A step this many times the usual one, and by more than a degree, is a gap of the field of view.
+const GAP_STEPS: u32 = 4;
+const GAP_CENTIDEG: u32 = 100;
+
+/// Firings of a packet.
+#[derive(Debug, Clone, Copy)]
+pub struct Turn {
+    /// First block of each firing, and one behind the last.
+    first: [usize; MOST + 1],
+    firings: usize,
+    /// The first block is the second one of a firing that began in the packet before.
+    lead: usize,
+    azimuth_centideg: [u32; MOST],
+    /// Usual step from firing to firing.
+    step_rad: f64,
+    /// Width of the gap behind the firing with this number.
+    gap: Option<(usize, f64)>,
+    /// Rotation rate over many packets, or within this one.
+    rate_rad_per_ns: f64,
+    firing_ns: f64,
+    /// Step behind the last firing and before a gap.
+    last_step_rad: f64,
+    is_on_grid: bool,
+}
+
+impl Turn {
+    /// Finds the firings; `mean_rate_rad_per_ns` is the rate over the packets before, or 0.
+    pub fn of<F: Family>(family: &F, view: &View<'_>, mean_rate_rad_per_ns: f64) -> Self {
+        let returns = family.returns(view);
+        let full = family.blocks_of_firing(returns).max(1);
+        let mut turn = Self {
+            first: [0; MOST + 1],
+            firings: 0,
+            lead: 0,
+            azimuth_centideg: [0; MOST],
+            step_rad: 0.0,
+            gap: None,
+            rate_rad_per_ns: 0.0,
+            firing_ns: family.firing_ns(returns),
+            last_step_rad: 0.0,
+            is_on_grid: family.is_on_grid(),
+        };
+        turn.find_firings(view, full);
+        turn.find_steps();
+        turn.last_step_rad = turn.step_rad;
+        let own = turn.step_rad / turn.firing_ns;
+        turn.rate_rad_per_ns = if mean_rate_rad_per_ns > 0.0 {
+            mean_rate_rad_per_ns
+        } else {
+            own
+        };
+        turn
+    }
+
+    /// Where no firing follows, the rotor turns at the speed that it is set to, as the maker has it.
+    pub fn with_speed(mut self, rpm: Option<u16>) -> Self {
+        if let Some(rpm) = rpm.filter(|rpm| *rpm > 0) {
+            let step_rad = f64::from(rpm) * TAU / 60e9 * self.firing_ns;
+            self.last_step_rad = (step_rad / RAD_PER_CENTIDEG).round() * RAD_PER_CENTIDEG;
+        }
+        self
+    }
+
+    /// Blocks of one firing share an azimuth. A first firing that is not whole began before the packet.
+    fn find_firings(&mut self, view: &View<'_>, full: usize) {
+        let blocks = view.blocks().min(MOST);
+        for block in 0..blocks {
+            let is_next = self.firings == 0
+                || view.azimuth(block) != view.azimuth(block - 1)
+                || block - self.first[self.firings - 1] >= full;
+            if is_next {
+                self.first[self.firings] = block;
+                self.azimuth_centideg[self.firings] = view.azimuth(block).into();
+                self.firings += 1;
+            }
+        }
+        self.first[self.firings] = blocks;
+        if self.firings > 1 {
+            self.lead = full.saturating_sub(self.first[1]);
+        }
+    }
+
+    fn find_steps(&mut self) {
+        let mut steps = [0_u32; MOST];
+        let count = self.firings.saturating_sub(1);
+        for (firing, step) in steps.iter_mut().enumerate().take(count) {
+            let (from, to) = (
+                self.azimuth_centideg[firing],
+                self.azimuth_centideg[firing + 1],
+            );
+            *step = (to + 36_000 - from) % 36_000;
+        }
+        let steps = &steps[..count];
+        let mut sorted = [0; MOST];
+        sorted[..count].copy_from_slice(steps);
+        sorted[..count].sort_unstable();
+        let usual = sorted[count / 2];
+        let is_gap = |step: &u32| *step > usual * GAP_STEPS && *step > usual + GAP_CENTIDEG;
+        let (sum, number) = steps
+            .iter()
+            .filter(|step| !is_gap(step))
+            .fold((0, 0), |(sum, number), step| (sum + step, number + 1));
+        self.step_rad = f64::from(sum) / f64::from(number.max(1)) * RAD_PER_CENTIDEG;
+        let gap = steps.iter().enumerate().find(|(_, step)| is_gap(step));
+        self.gap =
+            gap.map(|(firing, step)| (firing, f64::from(*step) * RAD_PER_CENTIDEG - self.step_rad));
+    }
+
+    /// Number of firings.
+    pub fn firings(&self) -> usize {
+        self.firings
+    }
+
+    /// Blocks of a firing, with their place in it.
+    pub fn blocks_of(&self, firing: usize) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let first = self.first[firing];
+        let lead = if firing == 0 { self.lead } else { 0 };
+        (first..self.first[firing + 1]).map(move |block| (block, block - first + lead))
+    }
+
+    /// Encoder azimuth of a firing, [0, 2 pi).
+    pub fn azimuth_rad(&self, firing: usize) -> f64 {
+        f64::from(self.azimuth_centideg[firing]) * RAD_PER_CENTIDEG
+    }
+
+    /// What the rotor turns within a firing until a shot.
+    pub fn turned_until(&self, firing: usize, delay_ns: i64) -> f64 {
+        let next = firing + 1;
+        let is_last = next >= self.firings || self.gap.is_some_and(|(before, _)| before == firing);
+        let step_rad = if is_last {
+            self.last_step_rad
+        } else {
+            (self.azimuth_rad(next) - self.azimuth_rad(firing)).rem_euclid(TAU)
+        };
+        let turned_rad = step_rad * delay_ns as f64 / self.firing_ns;
+        if self.is_on_grid {
+            // Steps are whole hundredths; a quotient just below one is one.
+            (turned_rad / RAD_PER_CENTIDEG + 1e-6).floor() * RAD_PER_CENTIDEG
+        } else {
+            turned_rad
+        }
+    }
+
+    /// Time of a firing after the packet's, over a gap from the rotation rate.
+    pub fn start_ns(&self, firing: usize) -> i64 {
+        let gap_ns = match self.gap {
+            Some((before, width_rad)) if firing > before && self.rate_rad_per_ns > 0.0 => {
+                width_rad / self.rate_rad_per_ns
+            }
+            _ => 0.0,
+        };
+        (firing as f64 * self.firing_ns + gap_ns).round() as i64
+    }
+
+    /// Rotation rate within the packet.
+    pub fn rate_rad_per_ns(&self) -> f64 {
+        self.step_rad / self.firing_ns
+    }
+
+    /// Firings that the packet stands for: one that it shares with another counts by its blocks.
+    fn whole_firings(&self) -> f64 {
+        let firings = self.firings as f64;
+        let last = self.firings.saturating_sub(1);
+        let size = |firing: usize| (self.first[firing + 1] - self.first[firing]) as f64;
+        let most = (0..self.firings).map(size).fold(1.0, f64::max);
+        let short = (1.0 - size(0) / most)
+            + if last > 0 {
+                1.0 - size(last) / most
+            } else {
+                0.0
+            };
+        firings - short
+    }
+
+    /// Angle from the first shot to where the next packet starts.
+    pub fn turned_rad(&self) -> f64 {
+        let gap_rad = self.gap.map_or(0.0, |(_, width_rad)| width_rad);
+        self.step_rad * self.whole_firings() + gap_rad
+    }
+
+    /// Time from the first shot to the start of the next packet.
+    pub fn duration_ns(&self) -> i64 {
+        let gap_ns = match self.gap {
+            Some((_, width_rad)) if self.rate_rad_per_ns > 0.0 => width_rad / self.rate_rad_per_ns,
+            _ => 0.0,
+        };
+        (self.whole_firings() * self.firing_ns + gap_ns).round() as i64
+    }
+
+    /// The gap of a limited field of view.
+    pub fn left_out(&self) -> Option<LeftOut> {
+        self.gap.map(|(firing, width_rad)| LeftOut {
+            after_rad: (firing + 1) as f64 * self.step_rad,
+            width_rad,
+        })
+    }
+}
