@@ -1,7 +1,7 @@
 //! Which model a stream's packets are of: by their identifying bytes, and by the packet period where
 //! those are not believed.
 
-use crate::packet::{Head, MODELS, Misfit, ModelRef, PacketKind, claimants};
+use crate::packet::{Head, MODELS, Misfit, Model, ModelRef, PacketKind, claimants};
 use crate::time::Timestamp;
 
 /// Packets after which a stream is decided.
@@ -139,9 +139,10 @@ impl Probe {
 
     /// Ids of the claimants that are not among the suited ones.
     fn left_out(&self, suited: &[ModelRef]) -> Vec<&'static str> {
-        let ids = self.claimants().into_iter().map(|model| model.id());
-        ids.filter(|id| suited.iter().all(|model| model.id() != *id))
-            .collect()
+        let claimants = self.claimants().into_iter();
+        let is_suited = |id: &str| suited.iter().any(|model| model.id() == id);
+        let others = claimants.filter(|model| !is_suited(model.id()));
+        others.map(Model::id).collect()
     }
 
     /// Claimants whose packets, taken together, look like theirs; all of them where none do.
