@@ -15,8 +15,7 @@ import pytest
 from lidar_deflect import capture
 from lidar_deflect.errors import CaptureError, CaptureNotFoundError, InvalidValueError
 from packets import PERIOD_NS, START_US, Sent, puck, write_pcap
-
-SCENES = Path(__file__).parents[2] / "shared" / "scenes"
+from scenes import SCENES
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import pytest
 from lidar_deflect import channels, delimited, tables
 from lidar_deflect.channels import Channel
 from lidar_deflect.errors import ConfigError, ConfigNotFoundError, InvalidValueError
+from scenes import SCENES
 
-SCENES = Path(__file__).parent.parent.parent / "shared" / "scenes"
 START_NS = 1_718_000_000_255_000_000
 
 

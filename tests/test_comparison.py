@@ -9,8 +9,7 @@ import folders
 from lidar_deflect import comparison, config, holds, steps, tables
 from lidar_deflect.comparison import ComparisonWarning, error_percent
 from lidar_deflect.errors import InvalidValueError, ResultError, ResultNotFoundError
-
-SCENES = Path(__file__).parent.parent.parent / "shared" / "scenes"
+from scenes import SCENES
 
 # Hu, Zhu, Zhou, Liu, Optics 2024, 5, 151-164 (CC BY 4.0), as printed.
 TABLE_1 = {  # section (m): x, y, total (m)

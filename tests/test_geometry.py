@@ -8,8 +8,8 @@ import pytest
 from lidar_deflect.config import Blade
 from lidar_deflect.errors import ConfigError
 from lidar_deflect.geometry import read_contours, read_geometry, read_stations
+from scenes import SCENES
 
-SCENES = Path(__file__).resolve().parent.parent.parent / "shared" / "scenes"
 HEADER = "s_m,chord_m,twist_deg,rel_thickness,prebend_m,axis_fraction,gj_nm2"
 ROWS = (
     "0,4.8,14.0,1.0,0.0,0.5,7e10",

@@ -8,8 +8,8 @@ import pytest
 from lidar_deflect import holds
 from lidar_deflect.errors import InvalidValueError
 from lidar_deflect.holds import HoldParams
+from scenes import SCENES
 
-SCENES = Path(__file__).parent.parent.parent / "shared" / "scenes"
 EPOCH_NS = 1_718_000_000_000_000_000
 Floats = npt.NDArray[np.float64]
 

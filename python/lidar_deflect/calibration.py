@@ -14,7 +14,7 @@ from lidar_deflect.errors import CalibrationError
 from lidar_deflect.files import write_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -207,8 +207,3 @@ def with_reference(
         calibration.warnings,
         {**calibration.reference, method: _plain(dict(reference))},
     )
-
-
-def join_warnings(parts: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """All warnings in order, each once."""
-    return tuple(dict.fromkeys(warning for part in parts for warning in part))

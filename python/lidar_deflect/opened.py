@@ -11,18 +11,18 @@ from lidar_deflect import holds as hold_finder
 from lidar_deflect import instruments
 from lidar_deflect.errors import CaptureError, InvalidValueError
 from lidar_deflect.measurement import Inputs, unloaded
+from lidar_deflect.measurement.inputs import stage_listener
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from lidar_deflect.calibration import Calibration
     from lidar_deflect.capture import Capture
     from lidar_deflect.channels import Channel
     from lidar_deflect.config import Config
     from lidar_deflect.holds import Hold
+    from lidar_deflect.measurement.inputs import Progress
     from lidar_deflect.measurement.unloaded import HoldCloud
-
-    Progress = Callable[[str, int, int], None]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class OpenedTest:
         """Open captures, see which lidars are in them, and read the load channel."""
         files = tuple(Path(path) for path in paths)
         capture = captures.open(files, config=config)
-        capture.scan(_stage(progress, "scan"))
+        capture.scan(stage_listener(progress, "scan"))
         if not capture.lidars:
             raise CaptureError(
                 "none of the configured lidars is in the capture",
@@ -88,8 +88,9 @@ class OpenedTest:
     def limits_ns(self, start_s: float | None, stop_s: float | None) -> tuple[int, int]:
         """Return limits in seconds since the first lidar packet as instants."""
         first, last = self.capture.first_time_ns, self.capture.last_time_ns
-        start = first if start_s is None else first + round(start_s * 1e9)
-        stop = last if stop_s is None else min(last, first + round(stop_s * 1e9))
+        given_start, given_stop = map(self.capture.instant_ns, (start_s, stop_s))
+        start = first if given_start is None else given_start
+        stop = last if given_stop is None else min(last, given_stop)
         if not first <= start < stop:
             raise InvalidValueError(
                 f"from {start_s} s to {stop_s} s holds nothing of the capture",
@@ -146,9 +147,3 @@ class OpenedTest:
             progress=self.progress,
             threads=self.threads,
         )
-
-
-def _stage(progress: Progress | None, name: str) -> Callable[[int, int], None] | None:
-    if progress is None:
-        return None
-    return lambda done, total: progress(name, done, total)

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from lidar_deflect.config import Config
     from lidar_deflect.holds import Hold
     from lidar_deflect.measurement import Inputs, States
+    from lidar_deflect.measurement.inputs import Progress
     from lidar_deflect.measurement.unloaded import HoldCloud
-    from lidar_deflect.opened import Progress
 
 DETAILS = ("contour", "points", "rejected")
 """Tables whose columns a method gives itself."""

@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from lidar_deflect.config import Config
     from lidar_deflect.plots import Plots
 
-TABLES = ("deflection", "steps", "contour", "points", "rejected", "health", "channels")
-"""Tables of every result folder; others (`comparison`, `cycles`, `poses`) join where they exist."""
-
 
 @dataclass(frozen=True, repr=False)
 class Result:

@@ -50,5 +50,9 @@ class Inputs:
 
     def listener(self, stage: str) -> Callable[[int, int], None] | None:
         """Return who is told the progress of one stage, or None where nobody listens."""
-        progress = self.progress
-        return None if progress is None else lambda done, total: progress(stage, done, total)
+        return stage_listener(self.progress, stage)
+
+
+def stage_listener(progress: Progress | None, stage: str) -> Callable[[int, int], None] | None:
+    """Return who is told the progress of one stage, or None where nobody listens."""
+    return None if progress is None else lambda done, total: progress(stage, done, total)

@@ -9,6 +9,7 @@ import numpy as np
 
 from lidar_deflect import instruments
 from lidar_deflect.errors import MeasurementError
+from lidar_deflect.registration import UP
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from lidar_deflect.measurement.unloaded import HoldCloud
 
     Floats = NDArray[np.float64]
-
-UP = np.array([0.0, 1.0, 0.0])
 
 NEAR_AXIS = 0.06
 """Unloaded, the blade lies within this share of its length of the z axis ..."""

@@ -20,7 +20,6 @@ F64 = pl.Float64()
 F32 = pl.Float32()
 STR = pl.String()
 U32 = pl.UInt32()
-I64 = pl.Int64()
 STATUS = pl.Enum(STATUSES)
 
 

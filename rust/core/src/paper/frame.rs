@@ -155,8 +155,8 @@ impl BladePoints {
     }
 }
 
-/// Steps 6 to 10.
-pub fn frame_contours(frame: &Frame, params: &FrameParams) -> FrameContours {
+/// Steps 6 to 10; beside them what step 6 left of each lidar's points.
+pub fn frame_contours(frame: &Frame, params: &FrameParams) -> (FrameContours, Vec<BladePoints>) {
     let (uses, blades): (Vec<_>, Vec<_>) = frame
         .shares
         .iter()
@@ -180,17 +180,18 @@ pub fn frame_contours(frame: &Frame, params: &FrameParams) -> FrameContours {
         Some(Contours { leading, trailing }) => intersect(leading, trailing, plane, &params.tip),
         None => Err(NoTip::NoIntersection),
     });
-    FrameContours {
+    let found = FrameContours {
         time: frame.time,
         uses,
         contours,
         tips,
         rejected,
-    }
+    };
+    (found, blades)
 }
 
 /// Steps 12 and 6 for one lidar: leave an overhead blade out, then drop the noise.
-pub fn blade_of(share: &Share, lidar: usize, params: &FrameParams) -> (ShareUse, BladePoints) {
+fn blade_of(share: &Share, lidar: usize, params: &FrameParams) -> (ShareUse, BladePoints) {
     let mut used = ShareUse {
         present: share.present,
         lost: share.lost_on_blade,

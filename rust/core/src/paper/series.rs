@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::frame::{BladePoints, FrameContours, FrameParams, ShareUse, blade_of, frame_contours};
+use super::frame::{BladePoints, FrameContours, FrameParams, ShareUse, frame_contours};
 use super::frames::Frame;
 use super::sections::MidLine;
 use super::tip::Plane;
@@ -111,18 +111,17 @@ impl ContourSeries {
             .par_iter()
             .enumerate()
             .map(|(index, frame)| {
-                let wanted = (done + index).is_multiple_of(sampling.every.max(1));
-                let blades = if wanted {
-                    sample(frame, params, sampling)
-                } else {
-                    Vec::new()
-                };
-                (frame_contours(frame, params), blades)
+                let (contours, mut blades) = frame_contours(frame, params);
+                if !(done + index).is_multiple_of(sampling.every.max(1)) {
+                    blades.clear();
+                }
+                (contours, blades)
             })
             .collect();
         for (contours, blades) in results {
             for (lidar, blade) in blades.iter().enumerate() {
-                self.points.extend(contours.time, lidar, blade);
+                let kept = blade.thinned(sampling.points);
+                self.points.extend(contours.time, lidar, &kept);
             }
             self.frames.push(contours);
         }
@@ -240,11 +239,6 @@ impl ContourSeries {
 
 fn mid_line(frame: &FrameContours) -> Option<MidLine> {
     frame.contours.as_ref()?.middle().ok()
-}
-
-fn sample(frame: &Frame, params: &FrameParams, sampling: Sampling) -> Vec<BladePoints> {
-    let of = |(lidar, share)| blade_of(share, lidar, params).1.thinned(sampling.points);
-    frame.shares.iter().enumerate().map(of).collect()
 }
 
 #[cfg(test)]
