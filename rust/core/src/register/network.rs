@@ -13,6 +13,7 @@ use super::normal::{Normal, Solved};
 use super::rows::{self, Row};
 use super::select::{self, Gate, Met};
 use super::state::{Layout, State, Term};
+use super::surface::Surface;
 use super::survey::Known;
 use super::variogram::{self, Sample};
 use crate::error::{Coded, InvalidValue};
@@ -37,9 +38,9 @@ const REFUSED: f64 = 6.0;
 /// sixteen thousand by chance.
 pub const GROSS: f64 = 4.0;
 /// Steps of one adjustment.
-const STEPS: usize = 25;
+const STEPS: usize = 12;
 /// An adjustment has settled when no pose moves by more than this part of its sigma.
-const SETTLED: f64 = 0.01;
+const SETTLED: f64 = 0.02;
 /// Gates of the search for surfaces, from the first poses to good ones.
 const GATES: [Gate; 4] = [
     Gate {
@@ -61,6 +62,10 @@ const GATES: [Gate; 4] = [
 ];
 /// A surface less rough than this is described by its smooth part alone, metres.
 const SMOOTH_M: f64 = 5e-4;
+/// Rounds in which roughness and the scatter of the channels' offsets are learned from what was found.
+const LEARNING_ROUNDS: usize = 2;
+/// It is not taken for less than this, metres.
+const LEAST_OFFSET_U_M: f64 = 2e-3;
 /// Holds nothing but an unknown that nothing else holds: radians, and metres.
 const LOOSE_RAD: f64 = 1.0;
 const LOOSE_M: f64 = 100.0;
@@ -119,6 +124,8 @@ pub struct Adjusted {
     pub judged: Vec<Vec<Judged>>,
     /// Where those rays ended, world frame, metres.
     points_m: Vec<Vector3<f64>>,
+    /// Scatter of the channels' offsets as found, metres.
+    pub offset_u_m: f64,
     /// Steps taken after the last change.
     pub steps: usize,
     /// Whether it settled.
@@ -194,7 +201,11 @@ pub fn adjust(network: &Network) -> Result<Adjusted, NetworkError> {
         work.settle(Doubt::All)?;
     }
     work.roughen();
-    work.settle(Doubt::All)?;
+    for _ in 0..LEARNING_ROUNDS {
+        let solved = work.settle(Doubt::All)?;
+        work.learn_offsets(&solved);
+        work.roughen();
+    }
     work.select(&GATES[GATES.len() - 1])?;
     let mut solved = work.settle(Doubt::Rays)?;
     while let Some(worst) = work.worst(&solved) {
@@ -217,6 +228,7 @@ struct Work<'a> {
     layout: Layout,
     met: Vec<Met>,
     left_out: Vec<bool>,
+    offset_u_m: f64,
     steps: usize,
     converged: bool,
 }
@@ -229,6 +241,7 @@ impl<'a> Work<'a> {
             layout: network.start.layout(),
             met: Vec::new(),
             left_out: vec![false; network.known.len()],
+            offset_u_m: network.priors.channel_offset_u_m,
             steps: 0,
             converged: false,
         }
@@ -257,7 +270,6 @@ impl<'a> Work<'a> {
                 .advance(&self.layout, &solved.border, &solved.nodes);
             self.steps = step;
             let moved = self.moved(&solved);
-            eprintln!("step {step} moved {moved} {:?}", &solved.border[..8]);
             solved = self.solve(doubt)?;
             if moved < SETTLED {
                 self.converged = true;
@@ -318,11 +330,7 @@ impl<'a> Work<'a> {
                 priors.elevation_u_rad,
             );
             normal.hold(at + Term::SCALE, lidar.scale, priors.range_scale_u);
-            normal.hold_alike(
-                at + Term::OFFSETS,
-                &lidar.offsets_m,
-                priors.channel_offset_u_m,
-            );
+            normal.hold_alike(at + Term::OFFSETS, &lidar.offsets_m, self.offset_u_m);
         }
         for (surface, at) in self.state.surfaces.iter().zip(&self.layout.surfaces) {
             (0..3).for_each(|k| normal.hold(at + k, 0.0, LOOSE_M));
@@ -332,11 +340,38 @@ impl<'a> Work<'a> {
         targets.for_each(|k| normal.hold(k, 0.0, LOOSE_M));
     }
 
+    /// Takes the scatter of the channels about their lidar's mean from what was found: squares of the
+    /// estimates plus their variances, one step of expectation and maximisation.
+    fn learn_offsets(&mut self, solved: &Solved) {
+        let (mut sum, mut freedom) = (0.0, 0.0);
+        for (lidar, at) in self.state.lidars.iter().zip(&self.layout.lidars) {
+            let count = lidar.offsets_m.len() as f64;
+            let mean = lidar.offsets_m.iter().sum::<f64>() / count;
+            sum += lidar
+                .offsets_m
+                .iter()
+                .map(|c| (c - mean).powi(2))
+                .sum::<f64>();
+            let own = at + Term::OFFSETS;
+            let block = solved
+                .covariance
+                .view((own, own), (lidar.offsets_m.len(), lidar.offsets_m.len()));
+            sum += block.trace() - block.sum() / count;
+            freedom += count - 1.0;
+        }
+        if freedom > 0.0 {
+            let most = self.network.priors.channel_offset_u_m;
+            self.offset_u_m = (sum / freedom)
+                .sqrt()
+                .clamp(LEAST_OFFSET_U_M.min(most), most);
+        }
+    }
+
     /// Gives every surface the roughness that its residuals show.
     fn roughen(&mut self) {
         for surface in 0..self.state.surfaces.len() {
             let samples = self.samples(surface);
-            eprintln!("{surface} {:?}",variogram::roughness(&samples));let Some(roughness) = variogram::roughness(&samples) else {
+            let Some(roughness) = variogram::roughness(&samples) else {
                 continue;
             };
             let mut places: Vec<_> = samples.iter().map(|s| s.place_m).collect();
@@ -359,13 +394,16 @@ impl<'a> Work<'a> {
 
     /// Residual heights of the rays on a surface.
     fn samples(&self, surface: usize) -> Vec<Sample> {
+        let shape = Surface {
+            field: None, // whatever is not smooth is what is looked for
+            ..self.state.surfaces[surface].clone()
+        };
         let on = self.met.iter().filter(|met| met.surface == surface);
         on.filter_map(|met| {
             self.ray(met).filter(|row| share(row) > 0.0)?;
             let beam = &self.network.holds[met.lidar].beams[met.beam];
             let lidar = &self.state.lidars[met.lidar];
             let point = select::world(lidar, beam);
-            let shape = &self.state.surfaces[surface];
             let [u, v, _] = shape.frame.local(&point);
             let (height_m, gradient, _) = shape.above(&point);
             let ray = (point - lidar.position_m) / beam.range_m;
@@ -419,6 +457,7 @@ impl<'a> Work<'a> {
             state: self.state,
             layout: self.layout,
             met: self.met,
+            offset_u_m: self.offset_u_m,
             steps: self.steps,
             converged: self.converged,
         }

@@ -57,7 +57,7 @@ impl Normal {
 
     fn add_roughness(&mut self, field: &Field, start: usize) {
         for weights in field.prior() {
-            let residual: f64 = weights.iter().map(|(i, w)| -w * field.heights_m[*i]).sum();
+            let residual = weights.iter().map(|(i, w)| w * field.heights_m[*i]).sum();
             let field = weights.into_iter().map(|(i, w)| (start + i, w)).collect();
             let row = Row {
                 residual,

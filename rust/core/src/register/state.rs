@@ -7,6 +7,9 @@ use super::surface::{COEFFICIENTS, Height, Surface};
 /// Roughness of a surface before anything is known of it, metres.
 pub const UNKNOWN_ROUGHNESS_M: f64 = 0.02;
 
+/// Share of the roughness that a blend between nodes does not follow.
+const BETWEEN_NODES: f64 = 0.3;
+
 /// One lidar as it is taken to stand.
 #[derive(Debug, Clone)]
 pub struct LidarState {
@@ -96,7 +99,7 @@ impl State {
         };
         let roughness = field.roughness();
         match height.around {
-            Some(_) => roughness.nugget_m,
+            Some(_) => roughness.nugget_m.hypot(BETWEEN_NODES * roughness.sigma_m),
             None => roughness.nugget_m.hypot(roughness.sigma_m),
         }
     }

@@ -336,6 +336,7 @@ fn described<'py>(
         all.set_item(*kind, judged(py, own)?)?;
         rest = after;
     }
+    all.set_item("offset_u_m", adjusted.offset_u_m)?;
     all.set_item("steps", adjusted.steps)?;
     all.set_item("converged", adjusted.converged)?;
     Ok(all)
