@@ -177,6 +177,7 @@ class _Work:
         self._total = sum(bag.size for bag in bags)
         self._done = 0
         self._paths: list[Path] = []
+        self._count = 0
         self._captures: list[dict[str, Any]] = []
         self._units: dict[str, UnitFile] = {}
         self._drops: dict[str, int] = {}
@@ -194,6 +195,7 @@ class _Work:
             for lane in lanes.values():
                 for stop_ns, payload in lane.packer.finish():
                     self._point_packet(lane, stop_ns, payload)
+        self._count += sum(lane.file.count for lane in lanes.values())
         self._done += bag.size
         self._tell(bag, 0)
         self._note(bag, lanes)
@@ -292,7 +294,7 @@ class _Work:
 
     def unpacked(self) -> Unpacked:
         """Give what came of it."""
-        if not self._paths:
+        if not self._count:
             raise _no_topics(self._bags, self._drops)
         return Unpacked(
             tuple(self._paths),
