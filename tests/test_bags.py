@@ -2,6 +2,7 @@
 
 import json
 import os
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from bag_files import KINDS, Bags, Entry, octets
 from conftest import command_line
 from lidar_deflect import bags, capture, decode, tables
 from lidar_deflect.errors import CaptureError, CaptureNotFoundError
-from packets import Sent, puck, write_pcap
+from packets import START_US, Sent, puck, write_pcap
 
 CAPTURES = Path(__file__).parents[2] / "shared" / "captures"
 SCAN = "velodyne_msgs/msg/VelodyneScan"
@@ -302,3 +303,86 @@ def test_without_the_extra_the_command_that_installs_it_is_named(tmp_path: Path)
     )
     assert done.returncode == 7
     assert "pip install 'lidar-deflect[ros]'" in done.stderr
+
+
+# --- whole measurements ----------------------------------------------------------------------
+
+
+def test_a_test_is_calibrated_and_measured_from_a_bag(short_test: Path, tmp_path: Path) -> None:
+    topics = {f"192.168.1.{200 + n}": f"/lidar_{n}/velodyne_packets" for n in range(1, 5)}
+    writer, parts = Bags("mcap"), dict[str, list[Sent]]()
+    for time_ns, source, payload in datagrams(short_test / "capture.pcap", tmp_path):
+        if len(payload) == 1206:  # drivers record no position packets among the others
+            parts.setdefault(source, []).append(Sent(time_ns // NANOS, source, payload))
+    entries = [
+        entry for source, sent in parts.items() for entry in scans(writer, sent, topics[source])
+    ]
+    pcap = write_pcap(tmp_path / "same.pcap", [one for sent in parts.values() for one in sent])
+    bag = writer.write(tmp_path / "run", sorted(entries, key=lambda entry: entry[2]))
+    text = (short_test / "test.toml").read_text(encoding="utf-8")
+    for source, topic in topics.items():
+        text = text.replace(f'source = "{source}"', f'source = "{topic}"')
+    for name in ("blade.csv", "contours.csv", "load.csv", "wire.csv", "theory.csv"):
+        (tmp_path / name).write_bytes((short_test / name).read_bytes())
+    (tmp_path / "test.toml").write_text(text, encoding="utf-8")
+    tables_of = []
+    for folder, captured in ((short_test, pcap), (tmp_path, bag)):
+        out = tmp_path / f"results-{captured.suffix[1:]}"
+        done = command_line("measure", "-c", folder / "test.toml", captured, "-o", out)
+        assert done.code in (0, 6), done.err
+        tables_of.append(tables.read(out / "deflection.parquet"))
+    assert len(tables_of[0]) > 30
+    assert tables_of[0]["d_m"].null_count() < len(tables_of[0]) / 2
+    assert tables_of[0].equals(tables_of[1])
+
+
+@pytest.mark.slow
+def test_a_longer_bag_takes_no_more_memory(tmp_path: Path) -> None:
+    if not Path("/proc/self/status").is_file():
+        pytest.skip("the system does not tell the peak of memory in /proc")
+    from test_exports import peak_kb
+
+    writer, peaks = Bags("db3"), []
+    for seconds in (10, 40):
+        sent = [
+            one
+            for number in range(seconds // 10)
+            for one in puck(10.0, start_us=START_US + number * 10**7)
+        ]
+        bag = writer.write(tmp_path / f"{seconds}", scans(writer, sent))
+        peaks.append(peak_kb(bag, tmp_path / f"{seconds}.ply"))
+    # 30 s more are 28 MB of packets, a seventh of the whole, and 370 MB of points.
+    assert peaks[1] < 1.1 * peaks[0]
+
+
+def test_layouts_of_bags_that_bring_none_are_known(tmp_path: Path) -> None:
+    writer, sent = Bags("db3"), [*puck(0.2)]
+    bag = writer.write(tmp_path / "run", scans(writer, sent))
+    with sqlite3.connect(bag) as database:
+        database.execute("DELETE FROM message_definitions")
+    assert capture.open(bag).streams[0].packets == len(sent)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="Ctrl-C is sent as a signal")
+def test_ctrl_c_leaves_neither_points_nor_unpacked_captures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from test_bad_input import interrupted, moments
+
+    scratch, folder = tmp_path / "scratch", tmp_path / "out"
+    scratch.mkdir()
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(scratch))
+    writer = Bags("mcap")
+    bag = writer.write(tmp_path / "run", scans(writer, [*puck(8.0)]))
+    codes = []
+    for delay_s in moments(2.0, 8, seed=8):
+        done = interrupted(["decode", str(bag), "-o", "points.laz"], folder, delay_s)
+        codes.append(done.code)
+        assert list(scratch.iterdir()) == []
+        assert "Traceback" not in done.err, done.err
+        if done.code == 130:
+            assert list(folder.iterdir()) == []
+        (folder / "points.laz").unlink(missing_ok=True)
+    assert codes.count(130) >= 4
