@@ -68,10 +68,10 @@ impl Sink for PointTagger {
             self.turn += 1;
             from = to;
         }
-        let rest = decoded.returns.len() - from;
+        let rest = decoded.cloud.len() - from;
         out.sweep.resize(out.sweep.len() + rest, self.turn);
         out.lidar.resize(out.sweep.len(), self.lidar);
-        out.cloud.extend(&decoded.returns);
+        out.cloud.extend(&decoded.cloud, 0..decoded.cloud.len());
     }
 
     fn finish(&mut self, _out: &mut PointBlock) {}
