@@ -50,6 +50,8 @@ pub struct Placed {
     pub time: Timestamp,
     /// Its times and angles.
     pub head: Head,
+    /// Frame that it belongs to, where the sensor counts them.
+    pub frame_id: Option<u32>,
     /// Packets that are missing before it.
     pub lost: u64,
     /// The clock jumped before it: nothing is known of how far the rotor turned.

@@ -9,6 +9,7 @@ pub mod beams;
 pub mod echoes;
 pub mod hesai;
 pub mod ouster;
+pub mod points;
 pub mod proof;
 pub mod robosense;
 pub mod unit;
@@ -73,6 +74,7 @@ pub static MODELS: &[ModelRef] = &[
     &robosense::ruby::PLUS_48,
     &robosense::airy::AIRY,
     &robosense::airy::FAIRY,
+    &points::POINTS,
 ];
 
 /// What the library must know of one sensor model.
@@ -130,6 +132,11 @@ pub trait Model: Sync + std::fmt::Debug {
     fn sequence_wrap(&self) -> Option<i64> {
         let bits = self.counting().sequence_bits;
         bits.map(|bits| 1_i64 << bits.min(62))
+    }
+
+    /// Number of the frame that a data packet belongs to, where the sensor counts them.
+    fn frame_id(&self, _payload: &[u8]) -> Option<u32> {
+        None
     }
 
     /// Models of the single units that `files` describe, where packets mean nothing without: those that are

@@ -138,6 +138,10 @@ impl Model for Unit {
         Misfit { why, may_be: None }
     }
 
+    fn frame_id(&self, payload: &[u8]) -> Option<u32> {
+        self.view(payload).map(|view| view.frame())
+    }
+
     fn head(&self, payload: &[u8]) -> Option<Head> {
         let view = self.view(payload)?;
         let span = Span::of(&view)?;
