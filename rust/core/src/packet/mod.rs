@@ -16,9 +16,10 @@ pub mod unit;
 pub mod velodyne;
 
 use crate::angle::{Arc, wrap_turn};
-use crate::cloud::Return;
+use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
+use crate::frame::Sensor;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
@@ -378,7 +379,7 @@ pub struct Place {
 #[derive(Debug, Default)]
 pub struct Decoded {
     /// The returns.
-    pub returns: Vec<Return>,
+    pub cloud: PointCloud<Sensor>,
     /// Encoder azimuth of each return's shot, before the channel's own offset: what sweeps are cut by.
     pub encoder_rad: Vec<f32>,
     /// Second returns that repeat the first and were merged into it.
@@ -401,7 +402,7 @@ impl Decoded {
 
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
-        self.returns.clear();
+        self.cloud.clear();
         self.encoder_rad.clear();
     }
 }

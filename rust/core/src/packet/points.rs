@@ -217,7 +217,7 @@ impl Decoder for PointsDecoder {
             }
             let encoder_rad = start_rad + f64::from(point.offset_ns) * rate;
             out.encoder_rad.push(wrapped(encoder_rad.rem_euclid(TAU)));
-            out.returns.push(Return {
+            out.cloud.push(&Return {
                 xyz_m: point.xyz_m,
                 time: place.time + i64::from(point.offset_ns),
                 range_m: point.range_m() as f32,
@@ -294,7 +294,7 @@ mod tests {
             found.drops.iter().collect::<Vec<_>>(),
             [("point_invalid", 2)]
         );
-        let (one, other) = (found.returns[0], found.returns[1]);
+        let (one, other) = (found.cloud.get(0), found.cloud.get(1));
         assert_eq!((one.range_m, one.ring, one.intensity), (5.0, 5, 300));
         assert_eq!((one.time.0, other.time.0), (1000, 501_000));
         // Clockwise from x: 4 to the left of 3 is a turn less 53 degrees, the right a quarter.

@@ -72,13 +72,13 @@ impl Sink for PointTagger {
             self.turn += 1;
             from = to;
         }
-        let rest = decoded.returns.len() - from;
+        let rest = decoded.cloud.len() - from;
         out.sweep.resize(out.sweep.len() + rest, self.turn);
         let points = out.sweep.len();
         out.lidar.resize(points, self.lidar);
         out.frame_id.resize(points, packet.frame_id.unwrap_or(0));
         out.has_frame_id.resize(points, packet.frame_id.is_some());
-        out.cloud.extend(&decoded.returns);
+        out.cloud.extend(&decoded.cloud, 0..decoded.cloud.len());
     }
 
     fn finish(&mut self, _out: &mut PointBlock) {}

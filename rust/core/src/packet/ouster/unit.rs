@@ -299,7 +299,7 @@ impl Decoder for UnitDecoder {
                     let Some((xyz_m, azimuth_rad)) = spot else {
                         continue;
                     };
-                    out.returns.push(Return {
+                    out.cloud.push(&Return {
                         xyz_m,
                         time: place.time + since_ns,
                         range_m: (f64::from(range_mm) * 0.001) as f32,
