@@ -320,6 +320,16 @@ def test_noise_behind_the_magic_is_an_error_of_the_input(tmp_path: Path) -> None
         capture.open(tmp_path / "absent.bag")
 
 
+@pytest.mark.parametrize(("suffix", "tool"), [("gz", "gzip"), ("zstd", "zstd")])
+def test_a_bag_compressed_as_a_whole_is_told(suffix: str, tool: str, tmp_path: Path) -> None:
+    path = tmp_path / f"run_0.db3.{suffix}"
+    path.write_bytes(b"\x1f\x8b")
+    with pytest.raises(CaptureError) as caught:
+        capture.open(path)
+    assert caught.value.code == "capture.compression"
+    assert caught.value.hint == f"decompress it first: {tool} -dk run_0.db3.{suffix}"
+
+
 def test_without_the_extra_the_command_that_installs_it_is_named(tmp_path: Path) -> None:
     writer = Bags("mcap")
     bag = writer.write(tmp_path / "run", scans(writer, [*puck(0.1)]))
