@@ -50,6 +50,9 @@ impl Seen {
 /// What is seen by shot and return.
 pub type At<'a> = &'a dyn Fn(usize, usize) -> Seen;
 
+/// Writes the packet with a number.
+pub type Encode = Box<dyn Fn(u32, At<'_>) -> Vec<u8>>;
+
 /// One way in which a model sends.
 pub struct Setting {
     pub name: &'static str,
@@ -57,7 +60,7 @@ pub struct Setting {
     /// Shots of a packet, and returns of a shot in it.
     pub shots: usize,
     pub echoes: usize,
-    pub encode: Box<dyn Fn(u32, At<'_>) -> Vec<u8>>,
+    pub encode: Encode,
     /// Device time of the first shot of a packet, and time of each shot after it.
     pub first_ns: Box<dyn Fn(u32) -> i64>,
     pub since_ns: Box<dyn Fn(u32, usize) -> i64>,
@@ -104,9 +107,13 @@ fn livox_shots(form: Form, shots: usize, at: At<'_>) -> Vec<Vec<RawPoint>> {
     // Rain in two shots of a packet.
     let tag = |shot: usize| if shot % 48 == 5 { 0b1000 } else { 0 };
     let shot = |shot: usize| {
+        let seen = |echo: usize| match form.coordinates {
+            Coordinates::Spherical => at(shot, 0).towards(at(shot, echo)),
+            _ => at(shot, echo),
+        };
         let echoes = 0..form.echoes;
         echoes
-            .map(|echo| livox_point(form, &at(shot, echo), tag(shot)))
+            .map(|echo| livox_point(form, &seen(echo), tag(shot)))
             .collect()
     };
     (0..shots).map(shot).collect()

@@ -1,6 +1,7 @@
 //! The models: what they differ in, how packets become returns.
 //!
-//! Length and first bytes tell the model, but for an M1 Plus, which sends what an M1 sends.
+//! Length and first bytes tell the model, and a type byte where it is known; but for an M1 Plus, which
+//! sends what an M1 sends.
 
 use super::blocks::{Block, Blocks, Point};
 use super::columns::Columns;
@@ -21,6 +22,8 @@ use crate::packet::{
 const UNIT_M: f64 = 0.005;
 /// Time of a frame at the rate that sensors are delivered with.
 const FRAME_NS: i64 = 100_000_000;
+/// Types that are known.
+const KINDS: [u8; 4] = [0x10, 0x42, 0x62, 0x70];
 /// How to get the pitch of the rows.
 const OBTAIN: &str = "record the packets that describe the unit as well (DIFOP2, port 7766, every two seconds), or give a \
     capture that has one: --beams ADDRESS=FILE";
@@ -320,12 +323,10 @@ impl Model for Solid {
         if let Some(kind) = description::kind(payload) {
             return Some(kind);
         }
-        (self.is_told && self.is_packet(payload)).then_some(PacketKind::Data)
-    }
-
-    /// The length is the model's alone; a type byte that is another's has to come in time.
-    fn is_sure(&self, payload: &[u8]) -> bool {
-        self.kind.is_none_or(|kind| kind == header::kind(payload))
+        let kind = header::kind(payload);
+        let is_others = self.kind != Some(kind) && KINDS.contains(&kind);
+        let is_own = self.is_told && !is_others && self.is_packet(payload);
+        is_own.then_some(PacketKind::Data)
     }
 
     fn fits(&self, payload: &[u8]) -> bool {
