@@ -27,7 +27,7 @@ class StreamInfo:
         Where the angles of the unit come from; begins with ``missing`` where there are none.
     return_mode
         ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with
-        its two returns in parentheses.
+        its two returns in parentheses; ``single`` where packets do not tell which it is.
     rpm
         Turns a minute in the mean; None for sensors without a rotor.
     packets, lost, duplicated, late, too_late, foreign

@@ -4,6 +4,8 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
+use crate::cloud::Return;
+
 /// Up to here sine and cosine of a small angle come from their series, to 3e-11.
 const SMALL_RAD: f64 = 0.02;
 
@@ -87,7 +89,8 @@ pub fn bearing(x: f32, y: f32) -> f32 {
     } else {
         (small, large)
     };
-    let ratio = if down > 0.0 { up / down } else { 0.0 };
+    // The smallest number keeps no direction from becoming none at all; to others it adds nothing.
+    let ratio = up / (down + f32::MIN_POSITIVE);
     let square = ratio * ratio;
     let series = ((8.053_744_5e-2 * square - 1.387_768_6e-1) * square + 1.997_771_1e-1) * square;
     let arc = (series - 3.333_295e-1) * square * ratio + ratio;
@@ -96,6 +99,33 @@ pub fn bearing(x: f32, y: f32) -> f32 {
     let half = if x < 0.0 { PI - quadrant } else { quadrant };
     let whole = if y < 0.0 { 2.0 * PI - half } else { half };
     if whole >= TAU as f32 { 0.0 } else { whole }
+}
+
+/// How many directions are worked out side by side.
+const LANES: usize = 16;
+
+/// Sets azimuths, from x towards y, of returns whose positions are known; `with_range` their ranges as well.
+pub fn bear(returns: &mut [Return], with_range: bool) {
+    for group in returns.chunks_mut(LANES) {
+        let mut xyz = [[0.0_f32; LANES]; 3];
+        for (lane, echo) in group.iter().enumerate() {
+            for (axis, metres) in xyz.iter_mut().zip(echo.xyz_m) {
+                axis[lane] = metres;
+            }
+        }
+        let [x, y, z] = xyz;
+        let azimuths: [f32; LANES] = std::array::from_fn(|lane| bearing(x[lane], y[lane]));
+        let square = |number: f32| f64::from(number) * f64::from(number);
+        let range = |lane: usize| (square(x[lane]) + square(y[lane]) + square(z[lane])).sqrt();
+        let ranges: [f64; LANES] =
+            std::array::from_fn(|lane| if with_range { range(lane) } else { 0.0 });
+        for (lane, echo) in group.iter_mut().enumerate() {
+            echo.azimuth_rad = azimuths[lane];
+            if with_range {
+                echo.range_m = ranges[lane] as f32;
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -12,6 +12,10 @@ const MAGIC: &str = "livox-account";
 /// Brightness of points outside of the field of view that a Mid-360 was set to.
 const CROPPED: u8 = 60;
 
+/// What is to be said of single returns.
+const SINGLE: &str =
+    "a single return is the first or the strongest, as the sensor was set: its packets do not tell";
+
 /// Sums over the data packets of a stream.
 #[derive(Debug)]
 pub struct Account {
@@ -63,9 +67,7 @@ impl Gather for Account {
         let sync = self.sync?;
         let mut lines = vec![MAGIC.into(), format!("the clock {}", sync.describe())];
         if self.echoes == 1 {
-            lines.push(
-                "a single return is the first or the strongest, as the sensor was set: its packets do not tell".into(),
-            );
+            lines.push(SINGLE.into());
         }
         let (points, doubtful, cropped) = (self.points, self.doubtful, self.cropped);
         if doubtful > 0 {
@@ -92,7 +94,7 @@ pub fn describe(files: &[UnitFile]) -> UnitFacts {
     let account = files.iter().find(|file| takes(file));
     let text = account.and_then(UnitFile::text).unwrap_or_default();
     UnitFacts {
-        return_mode: None,
+        return_mode: text.lines().any(|line| line == SINGLE).then_some("single"),
         notes: text.lines().skip(1).map(Into::into).collect(),
     }
 }

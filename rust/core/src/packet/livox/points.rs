@@ -1,6 +1,6 @@
 //! Points as the packets of both protocols carry them: Cartesian or spherical, one, two or three of a shot.
 
-use crate::packet::aim::{Centidegrees, bearing};
+use crate::packet::aim::Centidegrees;
 
 /// How the place of a point is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,9 +45,9 @@ pub struct RawPoint {
 pub struct Spot {
     /// Position, metres.
     pub xyz_m: [f32; 3],
-    /// Range, metres.
+    /// Range, metres; 0 where it follows from the position.
     pub range_m: f32,
-    /// From forward to the left, [0, 2 pi).
+    /// From forward to the left, [0, 2 pi); 0 where it follows from the position.
     pub azimuth_rad: f32,
 }
 
@@ -197,11 +197,12 @@ impl Form {
                 azimuth_rad: table.wrapped(azimuth),
             };
         }
-        let [x, y, z] = point.numbers.map(|number| f64::from(number) * unit_m);
         Spot {
-            xyz_m: [x as f32, y as f32, z as f32],
-            range_m: (x * x + y * y + z * z).sqrt() as f32,
-            azimuth_rad: bearing(x as f32, y as f32),
+            xyz_m: point
+                .numbers
+                .map(|number| (f64::from(number) * unit_m) as f32),
+            range_m: 0.0,
+            azimuth_rad: 0.0,
         }
     }
 }
@@ -281,9 +282,8 @@ mod tests {
         };
         for (coordinates, unit_m) in [(Coordinates::Narrow, 0.01), (Coordinates::Wide, 0.001)] {
             let spot = Form::new(coordinates, 1, true).place(&point, Centidegrees::table());
-            assert!((f64::from(spot.range_m) - 1300.0 * unit_m).abs() < 1e-6);
-            let azimuth_rad = (-4.0_f64).atan2(3.0) + std::f64::consts::TAU;
-            assert!((f64::from(spot.azimuth_rad) - azimuth_rad).abs() < 1e-6);
+            let expected = [300.0, -400.0, 1200.0].map(|number| (number * unit_m) as f32);
+            assert_eq!(spot.xyz_m, expected);
         }
     }
 }

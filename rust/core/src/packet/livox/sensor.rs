@@ -11,7 +11,7 @@ use super::{sdk1, sdk2};
 use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
-use crate::packet::aim::{Centidegrees, wrapped};
+use crate::packet::aim::{Centidegrees, bear, wrapped};
 use crate::packet::echoes::{self, Meanings, RawEcho, judge};
 use crate::packet::frames::{RAD_PER_NS, phase_rad};
 use crate::packet::unit::{Calibration, Fitted, Gather, UnitFacts, UnitFile};
@@ -164,24 +164,19 @@ impl Livox {
 
 /// Meaning of the points of a shot, by their ranges, and how many repeat another.
 fn meanings(packet: &Packet<'_>, points: &[RawPoint]) -> (Meanings, u32) {
-    let order = |point: &RawPoint| packet.form.order(point);
-    // Places by range stand for the ranges, which have more bits.
-    let rank = |point: &RawPoint| {
-        let nearer = points.iter().filter(|other| order(other) < order(point));
-        RawEcho {
-            range: if packet.form.is_none(point) {
-                0
-            } else {
-                1 + nearer.count() as u16
-            },
-            intensity: point.reflectivity,
-        }
-    };
-    let mut ranks = [RawEcho::default(); echoes::MOST];
-    for (place, point) in ranks.iter_mut().zip(points) {
-        *place = rank(point);
+    let mut orders = [0; echoes::MOST];
+    for (order, point) in orders.iter_mut().zip(points) {
+        *order = packet.form.order(point);
     }
-    let (mut kinds, merged) = judge(packet.return_mode(), &ranks[..points.len()]);
+    let orders = &orders[..points.len().min(echoes::MOST)];
+    // Places by range stand for the ranges, which have more bits; no range is no return.
+    let mut ranks = [RawEcho::default(); echoes::MOST];
+    for ((rank, point), order) in ranks.iter_mut().zip(points).zip(orders) {
+        let nearer = orders.iter().filter(|other| *other < order).count() as u16;
+        rank.range = if *order == 0 { 0 } else { 1 + nearer };
+        rank.intensity = point.reflectivity;
+    }
+    let (mut kinds, merged) = judge(packet.return_mode(), &ranks[..orders.len()]);
     if kinds.iter().flatten().count() == echoes::MOST {
         for kind in kinds.iter_mut().flatten() {
             // Between the first and the last of three is the second.
@@ -363,37 +358,52 @@ struct Work<'a> {
     table: Centidegrees,
 }
 
-impl Work<'_> {
+/// Number, time and line of a shot.
+#[derive(Clone, Copy)]
+struct Shot {
+    number: u16,
+    since_ns: i64,
+    line: u16,
+}
+
+impl<'a> Work<'a> {
+    /// The shots of the packet.
+    fn shots(&self) -> impl Iterator<Item = (Shot, &'a [u8])> + use<'a> {
+        let lines = (0..self.lines).cycle();
+        let times = self.packet.step.times().zip(lines);
+        let shots = (0..=u16::MAX).zip(times).zip(self.packet.shots());
+        shots.map(|((number, (since_ns, line)), bytes)| {
+            let shot = Shot {
+                number,
+                since_ns,
+                line,
+            };
+            (shot, bytes)
+        })
+    }
+
     #[inline]
-    fn push(
-        &self,
-        shot: usize,
-        echo: usize,
-        point: &RawPoint,
-        kind: ReturnKind,
-        out: &mut Decoded,
-    ) {
-        let since_ns = self.packet.step.until(shot);
+    fn push(&self, shot: Shot, echo: usize, point: &RawPoint, kind: ReturnKind, out: &mut Decoded) {
         let spot = self.packet.form.place(point, self.table);
         out.returns.push(Return {
             xyz_m: spot.xyz_m,
-            time: self.place.time + since_ns,
+            time: self.place.time + shot.since_ns,
             range_m: spot.range_m,
             azimuth_rad: spot.azimuth_rad,
-            ring: shot as u16 % self.lines,
+            ring: shot.line,
             intensity: point.reflectivity.into(),
             return_index: echo as u8,
             return_kind: kind,
             packet: self.place.packet,
-            block: shot as u16,
+            block: shot.number,
         });
-        out.encoder_rad
-            .push(wrapped(self.phase_rad + since_ns as f64 * RAD_PER_NS));
+        let encoder_rad = self.phase_rad + shot.since_ns as f64 * RAD_PER_NS;
+        out.encoder_rad.push(wrapped(encoder_rad));
     }
 
     /// Shots of one return each.
     fn single(&self, out: &mut Decoded) {
-        for (shot, bytes) in self.packet.shots().enumerate() {
+        for (shot, bytes) in self.shots() {
             let point = self.packet.form.read(bytes, 0);
             if !self.packet.form.is_none(&point) {
                 self.push(shot, 0, &point, ReturnKind::Strongest, out);
@@ -403,7 +413,7 @@ impl Work<'_> {
 
     /// Shots of several returns each.
     fn several(&self, out: &mut Decoded) {
-        for (shot, bytes) in self.packet.shots().enumerate() {
+        for (shot, bytes) in self.shots() {
             let (points, echoes) = points(&self.packet, bytes);
             let (kinds, merged) = meanings(&self.packet, &points[..echoes]);
             out.merged += u64::from(merged);
@@ -434,14 +444,16 @@ impl Decoder for LivoxDecoder {
             lines: self.model.lines,
             table: self.table,
         };
-        if packet.form.echoes > 1 {
-            return work(packet.form.coordinates).several(out);
-        }
+        let first = out.returns.len();
         // One loop for each kind of coordinates.
         match packet.form.coordinates {
+            coordinates if packet.form.echoes > 1 => work(coordinates).several(out),
             Coordinates::Wide => work(Coordinates::Wide).single(out),
             Coordinates::Narrow => work(Coordinates::Narrow).single(out),
             Coordinates::Spherical => work(Coordinates::Spherical).single(out),
+        }
+        if packet.form.coordinates != Coordinates::Spherical {
+            bear(&mut out.returns[first..], true);
         }
     }
 }

@@ -62,6 +62,43 @@ impl Step {
     }
 }
 
+/// Times of shots after the first one, without a division for each.
+#[derive(Debug, Clone, Copy)]
+pub struct Times {
+    step: Step,
+    whole_ns: i64,
+    rest: i64,
+    next: (i64, i64),
+}
+
+impl Step {
+    /// Times of one shot after the other.
+    pub fn times(self) -> Times {
+        Times {
+            step: self,
+            whole_ns: self.ns / self.shots,
+            rest: self.ns % self.shots,
+            next: (0, 0),
+        }
+    }
+}
+
+impl Iterator for Times {
+    type Item = i64;
+
+    #[inline]
+    fn next(&mut self) -> Option<i64> {
+        let (now_ns, parts) = self.next;
+        let parts = parts + self.rest;
+        let carry = i64::from(parts >= self.step.shots);
+        self.next = (
+            now_ns + self.whole_ns + carry,
+            parts - carry * self.step.shots,
+        );
+        Some(now_ns)
+    }
+}
+
 /// Borrowed data packet: its lengths were checked.
 #[derive(Debug, Clone, Copy)]
 pub struct Packet<'a> {
@@ -101,6 +138,24 @@ impl<'a> Packet<'a> {
             1 => ReturnMode::Strongest,
             2 => ReturnMode::FirstSecond,
             _ => ReturnMode::Triple,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_shots_are_those_of_the_step() {
+        for step in [
+            Step::new(12_500, 3),
+            Step::new(475_000, 95),
+            Step::new(250_000, 113),
+        ] {
+            for (shot, time_ns) in step.times().take(200).enumerate() {
+                assert_eq!(time_ns, step.until(shot), "{step:?}");
+            }
         }
     }
 }

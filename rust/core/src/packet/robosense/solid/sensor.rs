@@ -10,7 +10,7 @@ use super::header;
 use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
-use crate::packet::aim::{Centidegrees, wrapped};
+use crate::packet::aim::{Centidegrees, bear, wrapped};
 use crate::packet::echoes::{RawEcho, judge};
 use crate::packet::frames::place_rad;
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
@@ -556,6 +556,7 @@ impl Decoder for SolidDecoder {
             return out.drops.add("packet_size", 1);
         };
         let mode = head.return_mode;
+        let first = out.returns.len();
         let mut work = Work {
             place,
             encoder_rad: wrapped(head.azimuth_rad),
@@ -573,6 +574,11 @@ impl Decoder for SolidDecoder {
             Body::Blocks(blocks) => self.model.pairs(blocks, payload, |shot, echoes| {
                 work.push_pair(&self.ray(blocks.point, &shot), echoes, mode);
             }),
+        }
+        if let Body::Blocks(blocks) = self.model.body
+            && blocks.point != Point::Angles
+        {
+            bear(&mut out.returns[first..], false);
         }
     }
 }
