@@ -71,7 +71,7 @@ fn check(writer: &Writer, setting: &Setting, number: u32, at: &dyn Fn(usize, usi
     let mut decoder = model.fit(&writer.files).unwrap().decoder;
     decoder.decode(&payload, place_at(head.device_ns), &mut out);
     let tally = model.tally(&payload);
-    let found = (out.returns.len(), out.merged);
+    let found = (out.cloud.len(), out.merged);
     assert_eq!(
         found,
         (tally.points as usize, u64::from(tally.merged)),
@@ -85,8 +85,8 @@ fn check(writer: &Writer, setting: &Setting, number: u32, at: &dyn Fn(usize, usi
         }
     }
     assert_eq!(found.0 as u64 + found.1, written, "{name}");
-    for echo in &out.returns {
-        let shot = (setting.shot_of)(echo);
+    for echo in out.cloud.iter() {
+        let shot = (setting.shot_of)(&echo);
         let sent = at(shot, usize::from(echo.return_index) % setting.echoes);
         let range_m = f64::from(echo.range_m);
         // Directions are written in parts of 1/32768 or in whole millimetres or centimetres.
@@ -138,11 +138,11 @@ fn a_farther_return_is_the_later_one_in_whatever_order() {
                 let mut decoder = writer.model.fit(&writer.files).unwrap().decoder;
                 decoder.decode(&payload, place_at(0), &mut out);
                 let nearest = out
-                    .returns
+                    .cloud
                     .iter()
                     .map(|echo| echo.range_m)
                     .fold(f32::MAX, f32::min);
-                for echo in &out.returns {
+                for echo in out.cloud.iter() {
                     let is_near = echo.range_m - nearest < 0.5;
                     let is_first =
                         matches!(echo.return_kind, ReturnKind::First | ReturnKind::Strongest);
@@ -209,14 +209,14 @@ fn ask_everything(writer: &Writer, decoder: &mut dyn Decoder, payload: &[u8], ou
     };
     decoder.decode(payload, place, out);
     let tally = model.tally(payload);
-    assert_eq!(out.returns.len(), tally.points as usize, "{}", model.id());
+    assert_eq!(out.cloud.len(), tally.points as usize, "{}", model.id());
     assert_eq!(
         out.merged - merged,
         u64::from(tally.merged),
         "{}",
         model.id()
     );
-    for echo in &out.returns {
+    for echo in out.cloud.iter() {
         assert!(
             echo.xyz_m.iter().all(|metres| metres.is_finite()),
             "{echo:?}"

@@ -4,22 +4,25 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 use std::f64::consts::TAU;
 use std::sync::LazyLock;
 
-use crate::cloud::Return;
-
 /// Up to here sine and cosine of a small angle come from their series, to 3e-11.
 const SMALL_RAD: f64 = 0.02;
 
 /// Sine and cosine of an angle turned on by a mostly small one.
 #[inline]
 pub fn turn(sin_cos: (f64, f64), by_rad: f64) -> (f64, f64) {
-    let by = if by_rad.abs() < SMALL_RAD {
+    add(sin_cos, small_turn(by_rad))
+}
+
+/// Sine and cosine of a mostly small angle.
+#[inline]
+pub fn small_turn(by_rad: f64) -> (f64, f64) {
+    if by_rad.abs() < SMALL_RAD {
         let square = by_rad * by_rad;
         let sin_by = by_rad * (1.0 - square / 6.0);
         (sin_by, 1.0 - square * (0.5 - square / 24.0))
     } else {
         by_rad.sin_cos()
-    };
-    add(sin_cos, by)
+    }
 }
 
 /// Sine and cosine of the sum of two angles.
@@ -29,7 +32,7 @@ pub fn add((sin, cos): (f64, f64), (sin_by, cos_by): (f64, f64)) -> (f64, f64) {
 }
 
 /// An angle not far outside of one turn brought into [0, 2 pi) of `f32`.
-#[inline]
+#[inline(always)]
 pub fn wrapped(angle_rad: f64) -> f32 {
     let once = if angle_rad >= TAU {
         angle_rad - TAU
@@ -101,30 +104,18 @@ pub fn bearing(x: f32, y: f32) -> f32 {
     if whole >= TAU as f32 { 0.0 } else { whole }
 }
 
-/// How many directions are worked out side by side.
-const LANES: usize = 16;
+/// Azimuths of positions, from x towards y.
+pub fn bear(xyz_m: &[[f32; 3]], azimuths_rad: &mut [f32]) {
+    for (azimuth_rad, [x, y, _]) in azimuths_rad.iter_mut().zip(xyz_m) {
+        *azimuth_rad = bearing(*x, *y);
+    }
+}
 
-/// Sets azimuths, from x towards y, of returns whose positions are known; `with_range` their ranges as well.
-pub fn bear(returns: &mut [Return], with_range: bool) {
-    for group in returns.chunks_mut(LANES) {
-        let mut xyz = [[0.0_f32; LANES]; 3];
-        for (lane, echo) in group.iter().enumerate() {
-            for (axis, metres) in xyz.iter_mut().zip(echo.xyz_m) {
-                axis[lane] = metres;
-            }
-        }
-        let [x, y, z] = xyz;
-        let azimuths: [f32; LANES] = std::array::from_fn(|lane| bearing(x[lane], y[lane]));
-        let square = |number: f32| f64::from(number) * f64::from(number);
-        let range = |lane: usize| (square(x[lane]) + square(y[lane]) + square(z[lane])).sqrt();
-        let ranges: [f64; LANES] =
-            std::array::from_fn(|lane| if with_range { range(lane) } else { 0.0 });
-        for (lane, echo) in group.iter_mut().enumerate() {
-            echo.azimuth_rad = azimuths[lane];
-            if with_range {
-                echo.range_m = ranges[lane] as f32;
-            }
-        }
+/// Distances of positions from the origin.
+pub fn reach(xyz_m: &[[f32; 3]], ranges_m: &mut [f32]) {
+    for (range_m, position) in ranges_m.iter_mut().zip(xyz_m) {
+        let [x, y, z] = position.map(f64::from);
+        *range_m = (x * x + y * y + z * z).sqrt() as f32;
     }
 }
 

@@ -11,15 +11,17 @@ pub mod frames;
 pub mod hesai;
 pub mod livox;
 pub mod ouster;
+pub mod points;
 pub mod proof;
 pub mod robosense;
 pub mod unit;
 pub mod velodyne;
 
 use crate::angle::{Arc, wrap_turn};
-use crate::cloud::Return;
+use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
+use crate::frame::Sensor;
 use crate::loss::cycle::Restarts;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
@@ -90,6 +92,7 @@ pub static MODELS: &[ModelRef] = &[
     &livox::sensor::TELE_15,
     &livox::sensor::MID_360,
     &livox::sensor::HAP,
+    &points::POINTS,
 ];
 
 /// What the library must know of one sensor model.
@@ -157,6 +160,11 @@ pub trait Model: Sync + std::fmt::Debug {
     /// Whether a rotor turns the beams. Others send frame after frame: one frame counts as one turn.
     fn has_rotor(&self) -> bool {
         true
+    }
+
+    /// Number of the frame that a data packet belongs to, where the sensor counts them.
+    fn frame_id(&self, _payload: &[u8]) -> Option<u32> {
+        None
     }
 
     /// Models of the single units that `files` describe, where packets mean nothing without: those that are
@@ -399,7 +407,7 @@ pub struct Place {
 #[derive(Debug, Default)]
 pub struct Decoded {
     /// The returns.
-    pub returns: Vec<Return>,
+    pub cloud: PointCloud<Sensor>,
     /// Encoder azimuth of each return's shot, before the channel's own offset: what sweeps are cut by.
     pub encoder_rad: Vec<f32>,
     /// Second returns that repeat the first and were merged into it.
@@ -422,7 +430,7 @@ impl Decoded {
 
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
-        self.returns.clear();
+        self.cloud.clear();
         self.encoder_rad.clear();
     }
 }

@@ -11,7 +11,7 @@ use super::{sdk1, sdk2};
 use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
-use crate::packet::aim::{Centidegrees, bear, wrapped};
+use crate::packet::aim::{Centidegrees, bear, reach, wrapped};
 use crate::packet::echoes::{self, Meanings, RawEcho, judge};
 use crate::packet::frames::{RAD_PER_NS, phase_rad};
 use crate::packet::unit::{Calibration, Fitted, Gather, UnitFacts, UnitFile};
@@ -385,7 +385,7 @@ impl<'a> Work<'a> {
     #[inline]
     fn push(&self, shot: Shot, echo: usize, point: &RawPoint, kind: ReturnKind, out: &mut Decoded) {
         let spot = self.packet.form.place(point, self.table);
-        out.returns.push(Return {
+        out.cloud.push(&Return {
             xyz_m: spot.xyz_m,
             time: self.place.time + shot.since_ns,
             range_m: spot.range_m,
@@ -444,7 +444,7 @@ impl Decoder for LivoxDecoder {
             lines: self.model.lines,
             table: self.table,
         };
-        let first = out.returns.len();
+        let first = out.cloud.len();
         // One loop for each kind of coordinates.
         match packet.form.coordinates {
             coordinates if packet.form.echoes > 1 => work(coordinates).several(out),
@@ -453,7 +453,9 @@ impl Decoder for LivoxDecoder {
             Coordinates::Spherical => work(Coordinates::Spherical).single(out),
         }
         if packet.form.coordinates != Coordinates::Spherical {
-            bear(&mut out.returns[first..], true);
+            let cloud = &mut out.cloud;
+            bear(&cloud.xyz_m[first..], &mut cloud.azimuth_rad[first..]);
+            reach(&cloud.xyz_m[first..], &mut cloud.range_m[first..]);
         }
     }
 }

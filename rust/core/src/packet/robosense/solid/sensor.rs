@@ -487,7 +487,7 @@ impl Work<'_> {
     #[inline]
     fn push(&mut self, ray: &Ray, echo: RawEcho, index: u8, kind: ReturnKind) {
         let range_m = f64::from(echo.range) * UNIT_M;
-        self.out.returns.push(Return {
+        self.out.cloud.push(&Return {
             xyz_m: ray.direction.map(|part| (range_m * part) as f32),
             time: self.place.time + ray.since_ns,
             range_m: range_m as f32,
@@ -556,7 +556,7 @@ impl Decoder for SolidDecoder {
             return out.drops.add("packet_size", 1);
         };
         let mode = head.return_mode;
-        let first = out.returns.len();
+        let first = out.cloud.len();
         let mut work = Work {
             place,
             encoder_rad: wrapped(head.azimuth_rad),
@@ -578,7 +578,8 @@ impl Decoder for SolidDecoder {
         if let Body::Blocks(blocks) = self.model.body
             && blocks.point != Point::Angles
         {
-            bear(&mut out.returns[first..], false);
+            let cloud = &mut out.cloud;
+            bear(&cloud.xyz_m[first..], &mut cloud.azimuth_rad[first..]);
         }
     }
 }
