@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from packets import START_US, Sent, write_pcap
 
 from lidar_deflect import capture
 from lidar_deflect.cli.app import run
+from packets import START_US, Sent, write_pcap
 
 LIVOX = "192.168.1.3"
 ROBOSENSE = "192.168.1.200"
