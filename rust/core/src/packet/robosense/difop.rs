@@ -61,6 +61,15 @@ impl<'a> Difop<'a> {
         self.0[field::REVERSED] == 1
     }
 
+    /// Lasers of up to 32 whose elevations are programmed.
+    pub fn lasers(&self) -> usize {
+        const MOST: usize = 32;
+        let bytes = &self.0[field::ELEVATIONS..field::ELEVATIONS + 3 * MOST];
+        let is_blank = |bytes: &[u8]| bytes.iter().all(|byte| *byte == bytes[0]) && bytes[0] != 1;
+        let told = bytes.chunks_exact(3).rposition(|angle| !is_blank(angle));
+        told.map_or(0, |last| last + 1)
+    }
+
     /// Serial number in hexadecimal.
     pub fn serial(&self) -> String {
         let bytes = &self.0[field::SERIAL..field::SERIAL + 6];
