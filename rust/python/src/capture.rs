@@ -176,7 +176,7 @@ fn sensor_models() -> Vec<(&'static str, &'static str)> {
 /// Id of the sensor model with this name; dashes and capitals do not matter, older names are taken too.
 #[pyfunction]
 fn sensor_id(name: &str) -> Option<&'static str> {
-    packet::model(name).ok().map(|model| model.id())
+    packet::model(name).ok().map(packet::Model::id)
 }
 
 /// What is decoded of each model and how that was proven: id, name, how it is recognised, returns,

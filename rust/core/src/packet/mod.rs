@@ -8,6 +8,7 @@ pub mod aim;
 pub mod beams;
 pub mod echoes;
 pub mod hesai;
+pub mod leishen;
 pub mod ouster;
 pub mod proof;
 pub mod robosense;
@@ -85,6 +86,34 @@ pub static MODELS: &[ModelRef] = &[
     &robosense::ruby::PLUS_48,
     &robosense::airy::AIRY,
     &robosense::airy::FAIRY,
+    &leishen::products::MODELS[0],
+    &leishen::products::MODELS[1],
+    &leishen::products::MODELS[2],
+    &leishen::products::MODELS[3],
+    &leishen::products::MODELS[4],
+    &leishen::products::MODELS[5],
+    &leishen::products::MODELS[6],
+    &leishen::products::MODELS[7],
+    &leishen::products::MODELS[8],
+    &leishen::products::MODELS[9],
+    &leishen::products::MODELS[10],
+    &leishen::products::MODELS[11],
+    &leishen::products::MODELS[12],
+    &leishen::products::MODELS[13],
+    &leishen::products::MODELS[14],
+    &leishen::products::MODELS[15],
+    &leishen::products::MODELS[16],
+    &leishen::products::MODELS[17],
+    &leishen::products::MODELS[18],
+    &leishen::products::MODELS[19],
+    &leishen::mirror::MODELS[0],
+    &leishen::mirror::MODELS[1],
+    &leishen::mirror::MODELS[2],
+    &leishen::mirror::MODELS[3],
+    &leishen::mirror::MODELS[4],
+    &leishen::mirror::MODELS[5],
+    &leishen::mirror::MODELS[6],
+    &leishen::mirror::MODELS[7],
 ];
 
 /// What the library must know of one sensor model.
@@ -122,6 +151,12 @@ pub trait Model: Sync + std::fmt::Debug {
     /// What a data packet tells beside its points that a user should know.
     fn remarks(&self, _payload: &[u8]) -> Vec<String> {
         Vec::new()
+    }
+
+    /// The model with the timing that all data packets of a stream, taken together, show; `None` where it
+    /// is this one's.
+    fn as_sent(&self, _packets: &[&[u8]]) -> Option<ModelRef> {
+        None
     }
 
     /// Whether `payload` has the layout of a data packet, whatever its identifying bytes say: for
@@ -292,13 +327,15 @@ pub struct LeftOut {
     pub after_rad: f64,
     /// Width of the gap.
     pub width_rad: f64,
+    /// No time passes in it: a mirror starts anew.
+    pub is_instant: bool,
 }
 
 impl Head {
     /// The same with the time over a gap from the rotation rate over many packets, which is known
     /// better than the rate within one.
     pub fn paced(mut self, mean_rate_rad_per_ns: f64) -> Self {
-        if let Some(gap) = self.left_out
+        if let Some(gap) = self.left_out.filter(|gap| !gap.is_instant)
             && self.rate_rad_per_ns > 0.0
             && mean_rate_rad_per_ns > 0.0
         {

@@ -2,6 +2,7 @@
 //! the capture, or gathered from the packets themselves.
 
 use super::Decoder;
+use crate::capture::DatagramReader;
 use crate::error::UnitError;
 
 /// A file that describes one unit. What it is, its content tells.
@@ -69,6 +70,23 @@ impl UnitFile {
             found: found.into(),
         }
     }
+}
+
+/// The packet in a file that `is_wanted`: the file itself, or the first one of a capture.
+pub fn first_packet(file: &UnitFile, is_wanted: impl Fn(&[u8]) -> bool) -> Option<Vec<u8>> {
+    /// A capture has one a second.
+    const MOST_DATAGRAMS: usize = 1_000_000;
+    if is_wanted(&file.content) {
+        return Some(file.content.clone());
+    }
+    let mut reader = DatagramReader::new(&file.content[..]).ok()?;
+    for _ in 0..MOST_DATAGRAMS {
+        let datagram = reader.next().ok()??;
+        if is_wanted(datagram.payload) {
+            return Some(datagram.payload.to_vec());
+        }
+    }
+    None
 }
 
 /// Where the angles of a decoder come from.

@@ -97,6 +97,16 @@ impl Probe {
     /// A model whose bytes are not believed has to have the packet period of the data, and of several
     /// that do the nearest is taken. Where there are too few packets to tell, all are candidates.
     pub fn decide(&self) -> Option<Choice> {
+        let mut choice = self.choose()?;
+        let payloads = self.packets.iter().map(|(_, payload)| payload.as_slice());
+        let own = payloads.filter(|payload| choice.model.head(payload).is_some());
+        if let Some(model) = choice.model.as_sent(&own.collect::<Vec<_>>()) {
+            choice.model = model;
+        }
+        Some(choice)
+    }
+
+    fn choose(&self) -> Option<Choice> {
         self.packets.first()?;
         if let Some(unit) = self.unit() {
             return Some(Choice::one(unit));

@@ -1,7 +1,6 @@
 //! Packets that describe the unit (DIFOP): angles, return mode, serial number, state of the clock.
 
-use crate::capture::DatagramReader;
-use crate::packet::unit::UnitFile;
+use crate::packet::unit::{UnitFile, first_packet};
 
 /// Byte ranges.
 mod field {
@@ -144,19 +143,8 @@ impl<'a> Difop<'a> {
 
 /// The packet in a file: the packet itself, or the first one of a capture.
 pub fn packet(file: &UnitFile) -> Option<[u8; LEN]> {
-    /// A capture has one a second.
-    const MOST_DATAGRAMS: usize = 1_000_000;
-    if let Some(difop) = Difop::new(&file.content) {
-        return Some(*difop.0);
-    }
-    let mut reader = DatagramReader::new(&file.content[..]).ok()?;
-    for _ in 0..MOST_DATAGRAMS {
-        let datagram = reader.next().ok()??;
-        if let Some(difop) = Difop::new(datagram.payload) {
-            return Some(*difop.0);
-        }
-    }
-    None
+    let bytes = first_packet(file, |payload| Difop::new(payload).is_some())?;
+    bytes.try_into().ok()
 }
 
 /// Writes a packet.

@@ -7,7 +7,7 @@ pub mod hdl32e;
 pub mod hdl64e;
 pub mod position;
 pub mod puck;
-mod rotation;
+pub(super) mod rotation;
 mod rows;
 pub mod vlp32;
 pub mod vls128;
