@@ -2,7 +2,7 @@
 //! it looks like, and does it survive any bytes?
 
 use lidar_deflect_core::capture::Datagram;
-use lidar_deflect_core::cloud::ReturnKind;
+use lidar_deflect_core::cloud::{Return, ReturnKind};
 use lidar_deflect_core::packet::leishen::ch::{Ch, RawPacket as ChPacket, Record};
 use lidar_deflect_core::packet::leishen::cx::{Cx, RawPacket};
 use lidar_deflect_core::packet::leishen::mirror::{self, MIRRORS};
@@ -89,7 +89,13 @@ fn ch_packet(model: &Ch, lines: usize, is_double: bool, number: usize) -> Vec<u8
     })
 }
 
-fn decode(model: &dyn Model, files: &[UnitFile], payload: &[u8]) -> Decoded {
+/// Points of a packet, and how many were merged.
+struct Points {
+    returns: Vec<Return>,
+    merged: u64,
+}
+
+fn decode(model: &dyn Model, files: &[UnitFile], payload: &[u8]) -> Points {
     let mut out = Decoded::default();
     let place = Place {
         time: Timestamp(model.head(payload).unwrap().device_ns),
@@ -101,7 +107,10 @@ fn decode(model: &dyn Model, files: &[UnitFile], payload: &[u8]) -> Decoded {
         .unwrap()
         .decoder
         .decode(payload, place, &mut out);
-    out
+    Points {
+        returns: out.cloud.iter().collect(),
+        merged: out.merged,
+    }
 }
 
 fn scan(sent: &[(i64, Vec<u8>)], other: &[(i64, Vec<u8>)]) -> ScanReport {
@@ -438,10 +447,10 @@ fn changed_bytes_are_survived() {
         let merged = out.merged;
         decoder.decode(&payload, place, &mut out);
         let tally = model.tally(&payload);
-        assert_eq!(out.returns.len(), tally.points as usize, "{}", model.id());
+        assert_eq!(out.cloud.len(), tally.points as usize, "{}", model.id());
         assert_eq!(out.merged - merged, u64::from(tally.merged));
         assert!(
-            out.returns
+            out.cloud
                 .iter()
                 .all(|echo| echo.xyz_m.iter().all(|m| m.is_finite()))
         );

@@ -10,15 +10,17 @@ pub mod echoes;
 pub mod hesai;
 pub mod leishen;
 pub mod ouster;
+pub mod points;
 pub mod proof;
 pub mod robosense;
 pub mod unit;
 pub mod velodyne;
 
 use crate::angle::{Arc, wrap_turn};
-use crate::cloud::Return;
+use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
+use crate::frame::Sensor;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
@@ -114,6 +116,7 @@ pub static MODELS: &[ModelRef] = &[
     &leishen::mirror::MODELS[5],
     &leishen::mirror::MODELS[6],
     &leishen::mirror::MODELS[7],
+    &points::POINTS,
 ];
 
 /// What the library must know of one sensor model.
@@ -187,6 +190,11 @@ pub trait Model: Sync + std::fmt::Debug {
     fn sequence_wrap(&self) -> Option<i64> {
         let bits = self.counting().sequence_bits;
         bits.map(|bits| 1_i64 << bits.min(62))
+    }
+
+    /// Number of the frame that a data packet belongs to, where the sensor counts them.
+    fn frame_id(&self, _payload: &[u8]) -> Option<u32> {
+        None
     }
 
     /// Models of the single units that `files` describe, where packets mean nothing without: those that are
@@ -431,7 +439,7 @@ pub struct Place {
 #[derive(Debug, Default)]
 pub struct Decoded {
     /// The returns.
-    pub returns: Vec<Return>,
+    pub cloud: PointCloud<Sensor>,
     /// Encoder azimuth of each return's shot, before the channel's own offset: what sweeps are cut by.
     pub encoder_rad: Vec<f32>,
     /// Second returns that repeat the first and were merged into it.
@@ -454,7 +462,7 @@ impl Decoded {
 
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
-        self.returns.clear();
+        self.cloud.clear();
         self.encoder_rad.clear();
     }
 }

@@ -390,7 +390,7 @@ impl Decoder for ChDecoder {
                 let range_m = f64::from(range) * packet::UNIT_M;
                 out.encoder_rad
                     .push(wrapped(stated_deg.to_radians().rem_euclid(TAU)));
-                out.returns.push(Return {
+                out.cloud.push(&Return {
                     xyz_m: direction.map(|part| (range_m * part) as f32),
                     time: Timestamp(place.time.0.saturating_add(delay_ns)),
                     range_m: range_m as f32,

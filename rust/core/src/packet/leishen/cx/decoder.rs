@@ -160,7 +160,7 @@ impl CxDecoder {
             let range_m = f64::from(echo.range) * self.cx.product.unit_m;
             let level_m = range_m * beam.cos_elevation;
             out.encoder_rad.push(wrapped(encoder_rad.rem_euclid(TAU)));
-            out.returns.push(Return {
+            out.cloud.push(&Return {
                 xyz_m: [
                     (level_m * sin + lens_m * lens_sin) as f32,
                     (level_m * cos + lens_m * lens_cos) as f32,
