@@ -354,7 +354,7 @@ impl Lidar {
             ));
         }
         notes.extend(self.remarks.iter().cloned());
-        if !self.left_out.is_empty() {
+        if !self.left_out.is_empty() && self.doubt.is_none() {
             let (model, others) = (self.model.id(), self.left_out.join(", "));
             notes.push(format!(
                 "told from {others} by the ranges, not by the header: name another model than {model} with --sensor"
