@@ -72,18 +72,18 @@ impl UnitFile {
     }
 }
 
-/// The packet in a file that `is_wanted`: the file itself, or the first one of a capture.
-pub fn first_packet(file: &UnitFile, is_wanted: impl Fn(&[u8]) -> bool) -> Option<Vec<u8>> {
+/// What `take` takes of a file: of the file itself, or of the first datagram of a capture that it takes.
+pub fn find<T>(file: &UnitFile, take: impl Fn(&[u8]) -> Option<T>) -> Option<T> {
     /// A capture has one a second.
     const MOST_DATAGRAMS: usize = 1_000_000;
-    if is_wanted(&file.content) {
-        return Some(file.content.clone());
+    if let Some(taken) = take(&file.content) {
+        return Some(taken);
     }
     let mut reader = DatagramReader::new(&file.content[..]).ok()?;
     for _ in 0..MOST_DATAGRAMS {
         let datagram = reader.next().ok()??;
-        if is_wanted(datagram.payload) {
-            return Some(datagram.payload.to_vec());
+        if let Some(taken) = take(datagram.payload) {
+            return Some(taken);
         }
     }
     None

@@ -1,6 +1,6 @@
 //! Packets that describe the unit (DIFOP), big endian: angles of older units, settings of the clock.
 
-use crate::packet::unit::{UnitFile, first_packet};
+use crate::packet::unit::{UnitFile, find};
 
 /// Byte ranges.
 mod field {
@@ -90,7 +90,9 @@ impl<'a> Difop<'a> {
 
 /// The packet in a file: the packet itself, or the first one of a capture.
 pub fn packet(file: &UnitFile) -> Option<Vec<u8>> {
-    first_packet(file, |payload| Difop::new(payload).is_some())
+    find(file, |payload| {
+        Difop::new(payload).map(|_| payload.to_vec())
+    })
 }
 
 /// Writes a packet with angles in hundredths of a degree at their places.

@@ -1,6 +1,7 @@
 //! Packets that describe the unit (DIFOP): angles, return mode, serial number, state of the clock.
 
-use crate::packet::unit::{UnitFile, first_packet};
+use crate::packet::unit::UnitFile;
+pub(super) use crate::packet::unit::find;
 
 /// Byte ranges.
 mod field {
@@ -143,8 +144,7 @@ impl<'a> Difop<'a> {
 
 /// The packet in a file: the packet itself, or the first one of a capture.
 pub fn packet(file: &UnitFile) -> Option<[u8; LEN]> {
-    let bytes = first_packet(file, |payload| Difop::new(payload).is_some())?;
-    bytes.try_into().ok()
+    find(file, |payload| Difop::new(payload).map(|difop| *difop.0))
 }
 
 /// Writes a packet.
