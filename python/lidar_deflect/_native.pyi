@@ -45,6 +45,7 @@ __all__ = [
     "rotation_onto",
     "scan_capture",
     "scan_quickly",
+    "sensor_id",
     "sensor_models",
     "sensor_table",
     "walk_arc",
@@ -77,6 +78,7 @@ def scan_quickly(
     units: Sequence[tuple[str | None, str, bytes, bool]],
     head_s: float,
 ) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
+def sensor_id(name: str) -> str | None: ...
 def sensor_models() -> list[tuple[str, str]]: ...
 def sensor_table() -> list[list[str]]: ...
 
