@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from lidar_deflect.wires import unit_vector
+
 Vector = npt.NDArray[np.float64]
 AXES = ("x", "y", "z")
 
@@ -108,13 +110,3 @@ def load_direction(config: Mapping[str, Any], rows: Sequence[Measured]) -> Vecto
         return unit_vector(given)
     largest = max(rows, key=lambda each: float(np.linalg.norm(each.deflection_m)))
     return unit_vector(largest.deflection_m.tolist())
-
-
-def unit_vector(given: str | Sequence[float]) -> Vector:
-    """Turn a world axis such as ``-x``, or a vector, into a unit vector."""
-    if isinstance(given, str):
-        vector = np.zeros(3)
-        vector[AXES.index(given[-1])] = -1.0 if given.startswith("-") else 1.0
-        return vector
-    vector = np.asarray(given, dtype=np.float64)
-    return vector / max(float(np.linalg.norm(vector)), 1e-300)
