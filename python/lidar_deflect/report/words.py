@@ -435,6 +435,8 @@ NOTHING_DROPPED = "Nothing was left out."
 DROPS_PLACES = {"capture": "capture", "run": "run", "blade": "near the blade"}
 SHIFTED = "Clocks of other instruments"
 
+SHEET_THINNED = "Every {every}. of {rows} rows stands in this workbook; the Parquet file holds all."
+
 CONFIGURATION = "The configuration with every default, as the run used it; its hash is {hash}."
 NO_CONFIGURATION = "The folder holds no configuration."
 
