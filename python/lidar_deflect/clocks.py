@@ -139,7 +139,7 @@ class _Pair:
             return None
         y, d = np.interp(at[inside], self.channel_t, self.channel), self.d[inside]
         spread = float(np.var(y))
-        if spread < 0.2 * float(np.var(self.channel)) or np.ptp(d) < 0.3 * np.ptp(self.d):
+        if spread <= 0.2 * float(np.var(self.channel)) or np.ptp(d) < 0.3 * np.ptp(self.d):
             return None
         terms = np.column_stack([np.ones_like(d), d, d * d])
         solution = np.linalg.lstsq(terms, y, rcond=None)[0]
