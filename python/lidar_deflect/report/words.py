@@ -437,6 +437,13 @@ SHIFTED = "Clocks of other instruments"
 
 SHEET_THINNED = "Every {every}. of {rows} rows stands in this workbook; the Parquet file holds all."
 
+NO_FONT = (
+    "no font of this machine has {characters}; they show as a replacement sign. Chinese needs a "
+    "font package such as fonts-noto-cjk"
+)
+TOO_LONG = "Too long for paper; the HTML report and the tables hold it."
+ON_SCREEN = "Figure {number}, the replay of the blade in space, moves only in the HTML report."
+
 CONFIGURATION = "The configuration with every default, as the run used it; its hash is {hash}."
 NO_CONFIGURATION = "The folder holds no configuration."
 
