@@ -31,6 +31,7 @@ def test_a_shift_is_found_to_some_milliseconds(shift_s: float) -> None:
     moved = 0.06 * record(t) + 3e-5 * record(t) ** 2 + rng.normal(0.0, 0.004, t.size)
     vector = np.column_stack([moved, 0.1 * moved, rng.normal(0.0, 0.02, t.size)])
     vector[60:66] = np.nan  # nothing was measured
+    vector[:, 2] += 9.0 * (rng.random(t.size) < 0.05)  # a component that fails now and then
     at = np.arange(0.0, 22.0, 0.05)
     load = Channel("load", ns(at - shift_s), record(at) + rng.normal(0.0, 0.3, at.size), "percent")
     found = clocks.estimate(load, ns(t), vector)

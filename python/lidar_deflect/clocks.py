@@ -33,6 +33,7 @@ _FINE_S = 0.004
 _SHARE = 0.5
 _EXPLAINED = 0.9
 _FEWEST = 20
+_MOVES = 0.15
 _MOST_STATES = 4000
 _SIGMAS = 5.0
 
@@ -72,7 +73,7 @@ def estimate(channel: Channel, time_ns: Times, deflection_m: Floats) -> Shift | 
         Instants of the states, shape (n,), rising.
     deflection_m
         Deflection of one section, shape (n,) or (n, 3); NaN where it was not measured. The
-        component that moves most is used.
+        component that explains the readings best is used.
 
     Returns
     -------
@@ -81,31 +82,25 @@ def estimate(channel: Channel, time_ns: Times, deflection_m: Floats) -> Shift | 
     """
     times, values = _states(time_ns, deflection_m)
     known = np.isfinite(channel.value)
-    if times.size < _FEWEST or known.sum() < _FEWEST or np.ptp(values) <= 0.0:
+    if times.size < _FEWEST or known.sum() < _FEWEST:
         return None
-    start = times[0]
-    pair = _Pair(
-        (times - start) * 1e-9,
-        values / np.max(np.abs(values)),
-        (channel.time_ns[known] - start) * 1e-9,
-        channel.value[known],
-    )
-    coarse = [pair.best(c - SEARCH_S, c + SEARCH_S, _COARSE_S) for c in pair.offsets()]
-    found = min((each for each in coarse if each is not None), key=lambda e: e[1], default=None)
-    if found is None:
-        return None
-    return pair.refined(found[0])
+    seconds = (times - times[0]) * 1e-9
+    channel_s = (channel.time_ns[known] - times[0]) * 1e-9
+    largest = float(np.max(np.ptp(values, axis=0)))
+    found = [
+        _Pair(seconds, column / largest, channel_s, channel.value[known]).shift()
+        for column in values.T
+        if largest > 0.0 and np.ptp(column) > _MOVES * largest
+    ]
+    return max((each for each in found if each), key=lambda each: each.explained, default=None)
 
 
 def _states(time_ns: Times, deflection_m: Floats) -> tuple[Times, Floats]:
+    """Moments at which everything is known, shape (n,), and the columns then, shape (n, m)."""
     values = deflection_m.reshape(len(time_ns), -1)
     known = np.isfinite(values).all(axis=1)
-    times, values = time_ns[known], values[known]
-    if not times.size:
-        return times, values[:, 0]
-    column = int(np.argmax(np.ptp(values, axis=0)))
-    every = -(-times.size // _MOST_STATES)
-    return times[::every], values[::every, column]
+    every = max(1, -(-int(known.sum()) // _MOST_STATES))
+    return time_ns[known][::every], values[known][::every]
 
 
 @dataclass(frozen=True)
@@ -116,6 +111,12 @@ class _Pair:
     d: Floats
     channel_t: Floats
     channel: Floats
+
+    def shift(self) -> Shift | None:
+        """Return the best shift, or None where nothing explains the readings."""
+        coarse = [self.best(c - SEARCH_S, c + SEARCH_S, _COARSE_S) for c in self.offsets()]
+        found = min((each for each in coarse if each), key=lambda each: each[1], default=None)
+        return None if found is None else self.refined(found[0])
 
     def offsets(self) -> Sequence[float]:
         """Return shifts to search about: none, or quarters of an hour that bring them together."""

@@ -34,9 +34,10 @@ def data(folder: Folder) -> dict[str, Any] | None:
     marks = _marks(folder.deflection, frames, shown)
     rest = _rest(folder, shown)
     moved = np.nan_to_num(np.linalg.norm(marks - rest, axis=-1), nan=-1.0).max(axis=1)
+    held = frames["step"].is_not_null().to_numpy()
     return {
         "first": int(np.argmax(moved >= 0.0)),
-        "largest": int(np.argmax(moved)),
+        "largest": int(np.argmax(np.where(held, moved, -2.0) if held.any() else moved)),
         "time": _packed(frames["t_s"].to_numpy()),
         "steps": _labels(frames),
         "sections": [{"name": name, "s_m": s_m} for name, s_m in shown],

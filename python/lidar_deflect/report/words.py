@@ -460,6 +460,12 @@ TWO_RUNS_CAPTION = (
     "the true one smaller. “beyond U” marks differences that their uncertainty does not explain."
 )
 TWO_RUNS_FIGURE = "Difference of the total deflection by section; bars are 95 % intervals."
-TWO_RUNS_SETTINGS = "What was set differently."
+TWO_RUNS_SETTINGS = "What was set differently"
+TWO_RUNS_SAME = "All {count} differences are explained by their uncertainty"
+TWO_RUNS_DIFFER = "{beyond} of {count} differences are beyond their uncertainty"
+TWO_RUNS_SILENT = "No verdict: a run states no uncertainty"
+TWO_RUNS_CHANCE = "Of independent differences about one in twenty is beyond its U by chance."
+TWO_RUNS_LARGEST = "largest difference of the total deflection"
+KEY = "key"
 SAME_SETTINGS = "Both runs have the same configuration."
 BEYOND = {"good": "explained", "bad": "beyond U", "open": "no uncertainty"}
