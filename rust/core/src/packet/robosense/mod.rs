@@ -11,4 +11,5 @@ pub mod layout;
 pub mod rotating;
 pub mod rs;
 pub mod ruby;
+pub mod solid;
 pub mod table;
