@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 RUST := Cargo.toml Cargo.lock $(shell find rust -path rust/fuzz -prune -o \( -name '*.rs' -o -name Cargo.toml \) -print)
 
-.PHONY: demo test test-rust test-python lint format bench fuzz wheel lock clean help cargo
+.PHONY: demo test test-rust test-python lint format bench fuzz wheel gallery lock clean help cargo
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -47,6 +47,10 @@ fuzz: cargo ## look for bytes that break a decoder: make fuzz TARGET=leishen SEC
 wheel: $(VENV)/ready cargo ## one stable-ABI wheel in dist/
 	$(BIN)/python tools/third_party.py
 	$(BIN)/maturin build --release --locked --out dist
+
+gallery: $(VENV)/built $(VENV)/tested ## renew the pictures of docs/gallery.md from the demo's report (chromium)
+	$(BIN)/lidar-deflect demo --out target/gallery --overwrite --quiet
+	$(BIN)/python tools/gallery.py target/gallery/results/report.html docs/gallery
 
 lock: $(VENV)/ready ## renew the pinned Python requirements
 	$(BIN)/python -m pip install --quiet uv
