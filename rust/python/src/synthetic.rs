@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use lidar_deflect_core::capture::PcapWriter;
 use lidar_deflect_core::error::InvalidValue;
@@ -14,6 +15,7 @@ use lidar_deflect_core::synthetic::motion::{Schedule, Sway};
 use lidar_deflect_core::synthetic::network::NetworkPlan;
 use lidar_deflect_core::synthetic::plan::{self, SaddlePlan};
 use lidar_deflect_core::synthetic::reference::{self, Stations};
+use lidar_deflect_core::synthetic::sensor::Sensor;
 use lidar_deflect_core::synthetic::terrain::{Crate, GroundPlan, Wall};
 use lidar_deflect_core::synthetic::truth::SectionTruth;
 use lidar_deflect_core::synthetic::{ScenePlan, Simulation};
@@ -405,7 +407,7 @@ impl From<BoxIn> for Crate {
 impl LidarIn {
     fn plan(self) -> Result<LidarPlan, InvalidValue> {
         Ok(LidarPlan {
-            model: lidar::model(&self.model)?,
+            sensor: Arc::new(Sensor::new(&self.model)?),
             address: self.address,
             port: self.port,
             position_m: self.position_m.into(),

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::body::{Body, Pose};
 use super::random::Stream;
 use super::terrain::{Hit, Ray, Terrain};
-use crate::packet::velodyne::{RawReturn, puck};
+use crate::packet::writer::Echo;
 
 /// The optics and electronics of a sensor.
 #[derive(Debug, Clone, Copy)]
@@ -138,28 +138,22 @@ impl Glow {
 
 impl Optics {
     /// The strongest echo of a shot as the sensor sends it, or none.
-    pub fn shoot(
-        &self,
-        view: &View<'_>,
-        ray: &Ray,
-        offset_m: f64,
-        stream: &mut Stream,
-    ) -> RawReturn {
+    pub fn shoot(&self, view: &View<'_>, ray: &Ray, offset_m: f64, stream: &mut Stream) -> Echo {
         let glows = view.glows(ray, self);
         let Some(echo) = self.strongest(&glows) else {
-            return RawReturn::default();
+            return Echo::default();
         };
         if !stream.happens(self.detection(&echo)) {
-            return RawReturn::default();
+            return Echo::default();
         }
         let slant = (1.0 / echo.cosine.max(0.05) - 1.0) * self.incidence_bias_m;
         let range_m = echo.range_m + offset_m + slant + self.noise_m * stream.normal();
         if range_m < MIN_RANGE_M || range_m > self.max_range_m {
-            return RawReturn::default();
+            return Echo::default();
         }
         let brightness = 100.0 * echo.brightness + 1.5 * stream.normal();
-        RawReturn {
-            range: (range_m / puck::RANGE_UNIT_M).round() as u16,
+        Echo {
+            range_m,
             intensity: brightness.round().clamp(1.0, 100.0) as u8,
         }
     }
@@ -273,8 +267,7 @@ mod tests {
         };
         let mut stream = Stream::new(2, Subject::Packet, [0, 0]);
         let ranges: Vec<f64> = (0..4000)
-            .map(|_| optics().shoot(&view, &ray, 0.02, &mut stream).range)
-            .map(|range| f64::from(range) * 0.002)
+            .map(|_| optics().shoot(&view, &ray, 0.02, &mut stream).range_m)
             .collect();
         let mean = ranges.iter().sum::<f64>() / 4000.0;
         let sigma = (ranges.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 4000.0).sqrt();

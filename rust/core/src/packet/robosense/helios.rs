@@ -9,7 +9,7 @@
 use std::sync::LazyLock;
 
 use super::difop::{Angles, Difop};
-use super::layout::{ID, Layout, Stamp, View, kind, type_of};
+use super::layout::{ID, Layout, Stamp, View, field, kind, type_of};
 use super::rotating::{Family, Lens, Rotating, Slot};
 use super::table::Table;
 use crate::packet::ReturnMode;
@@ -99,6 +99,13 @@ impl Family for Helios {
             Self::Wide => halves_agree(self.layout(), packets) != Some(true),
             Self::Half => halves_agree(self.layout(), packets) != Some(false),
         }
+    }
+
+    fn header(&self) -> Vec<(usize, u8)> {
+        vec![
+            (field::TYPE.start + 1, TYPE),
+            (field::TYPE.start + 2, self.model_byte()),
+        ]
     }
 
     fn lasers(&self) -> usize {

@@ -12,3 +12,4 @@ pub mod rotating;
 pub mod rs;
 pub mod ruby;
 pub mod table;
+pub mod writer;

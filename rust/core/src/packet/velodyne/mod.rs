@@ -11,6 +11,7 @@ mod rotation;
 mod rows;
 pub mod vlp32;
 pub mod vls128;
+pub mod writer;
 
 use crate::packet::echoes::RawEcho;
 use crate::packet::{Misfit, ReturnMode};
