@@ -24,6 +24,17 @@ pub struct Clock {
     pub locked: bool,
 }
 
+/// A tripod that somebody knocks against.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kick {
+    /// When, seconds of scene time.
+    pub at_s: f64,
+    /// By how much it turns, right-hand about the world axes, rad.
+    pub turn_rad: Vector3<f64>,
+    /// By how much the optical centre moves, world frame, metres.
+    pub shift_m: Vector3<f64>,
+}
+
 /// A sensor as it is planned.
 #[derive(Debug, Clone)]
 pub struct LidarPlan {
@@ -47,6 +58,10 @@ pub struct LidarPlan {
     pub channel_offset_m: f64,
     /// Standard deviation of the range offset of the unit, metres.
     pub unit_offset_m: f64,
+    /// What moves it during the test.
+    pub kick: Option<Kick>,
+    /// From when to when nothing arrives from it, seconds of scene time.
+    pub silent_s: Vec<[f64; 2]>,
 }
 
 /// A sensor as it stands.
@@ -168,11 +183,35 @@ impl Lidar {
         wrap_turn(self.turned_rad(scene_ns))
     }
 
-    /// The ray of a shot while the rotor stands at an azimuth.
-    pub fn ray(&self, shot: &Shot, azimuth_rad: f64) -> Ray {
-        let turned = self.rotation * Rotation3::from_axis_angle(&Vector3::z_axis(), -azimuth_rad);
+    /// Its pose at a scene time.
+    pub fn pose(&self, scene_ns: f64) -> (Rotation3<f64>, Vector3<f64>) {
+        match &self.plan.kick {
+            Some(kick) if scene_ns >= kick.at_s * 1e9 => (
+                Rotation3::from_scaled_axis(kick.turn_rad) * self.rotation,
+                self.plan.position_m + kick.shift_m,
+            ),
+            _ => (self.rotation, self.plan.position_m),
+        }
+    }
+
+    /// Whether nothing arrives that is sent at a scene time.
+    pub fn is_silent(&self, scene_ns: f64) -> bool {
+        let seconds = scene_ns * 1e-9;
+        let mut spans = self.plan.silent_s.iter();
+        spans.any(|[from, to]| (*from..*to).contains(&seconds))
+    }
+
+    /// The ray of a shot at a scene time.
+    pub fn ray(&self, shot: &Shot, scene_ns: f64) -> Ray {
+        self.ray_at(shot, scene_ns, self.azimuth_rad(scene_ns))
+    }
+
+    /// The ray of a shot at a scene time, were the rotor at this azimuth.
+    pub fn ray_at(&self, shot: &Shot, scene_ns: f64, azimuth_rad: f64) -> Ray {
+        let (rotation, position_m) = self.pose(scene_ns);
+        let turned = rotation * Rotation3::from_axis_angle(&Vector3::z_axis(), -azimuth_rad);
         Ray {
-            origin_m: self.plan.position_m + turned * shot.origin_m,
+            origin_m: position_m + turned * shot.origin_m,
             direction: turned * shot.direction,
         }
     }
@@ -220,6 +259,8 @@ pub(super) mod tests {
             clock,
             channel_offset_m: 0.01,
             unit_offset_m: 0.0,
+            kick: None,
+            silent_s: Vec::new(),
         };
         Lidar::new(plan, 3, 0, Timestamp(1_718_000_000_000_000_000))
     }
@@ -244,10 +285,27 @@ pub(super) mod tests {
     fn rays_point_as_the_driver_publishes() {
         let lidar = lidar(Clock::default());
         let shot = lidar.plan.sensor.shots[0][15].unwrap();
-        let ray = lidar.ray(&shot, 0.3);
+        let ray = lidar.ray_at(&shot, 0.0, 0.3);
         let point = lidar.sensor_from_world(&ray.at(20.0));
         assert!((point.y / point.x + 0.3f64.tan()).abs() < 1e-6);
         assert!((point.z - 20.0 * 15f64.to_radians().sin() + 0.011_23).abs() < 2e-5);
+    }
+
+    #[test]
+    fn a_kicked_tripod_stands_otherwise_from_then_on() {
+        let mut lidar = lidar(Clock::default());
+        lidar.plan.kick = Some(Kick {
+            at_s: 2.0,
+            turn_rad: Vector3::y() * 5e-4,
+            shift_m: Vector3::x() * 2e-3,
+        });
+        lidar.plan.silent_s = vec![[3.0, 4.0]];
+        let shot = lidar.plan.sensor.shots[0][7].unwrap();
+        let [before, after] = [1.9e9, 2.1e9].map(|ns| lidar.ray_at(&shot, ns, 1.0));
+        assert!((after.origin_m - before.origin_m).norm() < 2.1e-3);
+        assert!(((after.origin_m - before.origin_m).x - 2e-3).abs() < 3e-5);
+        assert!((after.direction - before.direction).norm() > 1e-4);
+        assert!(lidar.is_silent(3.5e9) && !lidar.is_silent(4.5e9));
     }
 
     #[test]

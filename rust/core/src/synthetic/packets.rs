@@ -58,7 +58,7 @@ impl Simulation {
             pose: states.at(scene_ns),
             nodes: sight.nodes(azimuth + shot.azimuth_rad),
         };
-        let ray = lidar.ray(shot, azimuth);
+        let ray = lidar.ray_at(shot, scene_ns, azimuth);
         let offset_m = lidar.range_offset_m[usize::from(shot.ring)];
         self.plan.optics.shoot(&view, &ray, offset_m, stream)
     }
@@ -181,7 +181,7 @@ mod tests {
                         let back = back.unwrap_or_else(|| panic!("{} row {row}", writer.id()));
                         let row_ns = lidar.row_ns(20 + number as u32, row);
                         let scene_ns = lidar.scene_ns(row_ns + shot.after_ns as f64);
-                        let ray = lidar.ray(shot, lidar.azimuth_rad(scene_ns));
+                        let ray = lidar.ray(shot, scene_ns);
                         let at = lidar.sensor_from_world(&ray.at(back.range_m.into()));
                         let seen = Vector3::from(back.xyz_m.map(f64::from));
                         worst.0 = worst.0.max((f64::from(back.range_m) - echo.range_m).abs());
