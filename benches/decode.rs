@@ -42,12 +42,12 @@ fn plain(payload: &[u8], cos_sin: &[(f64, f64); 16], out: &mut Vec<[f32; 3]>) {
     }
 }
 
-fn second(mode: ReturnMode) -> Vec<Sent> {
+fn seconds(mode: ReturnMode, seconds: f64) -> Vec<Sent> {
     let puck = Puck {
         mode,
         ..Puck::default()
     };
-    puck.packets(1.0)
+    puck.packets(seconds)
 }
 
 fn decode(c: &mut Criterion) {
@@ -62,7 +62,7 @@ fn decode(c: &mut Criterion) {
         ("single", ReturnMode::Strongest),
         ("dual", ReturnMode::Dual),
     ] {
-        let sent = second(mode);
+        let sent = seconds(mode, 1.0);
         let points: u64 = sent
             .iter()
             .map(|s| u64::from(model.tally(&s.payload).points))
@@ -81,11 +81,11 @@ fn decode(c: &mut Criterion) {
                     };
                     decoder.decode(black_box(&packet.payload), place, &mut out);
                 }
-                out.returns.len()
+                out.cloud.len()
             });
         });
     }
-    let sent = second(ReturnMode::Strongest);
+    let sent = seconds(ReturnMode::Strongest, 1.0);
     group.throughput(Throughput::Elements(sent.len() as u64 * 384));
     let mut out = Vec::new();
     group.bench_function("plain twin, positions only", |b| {
@@ -102,7 +102,7 @@ fn decode(c: &mut Criterion) {
 
 fn stream(c: &mut Criterion) {
     let mut group = c.benchmark_group("stream");
-    let sent = second(ReturnMode::Strongest);
+    let sent = seconds(ReturnMode::Strongest, 10.0);
     group.throughput(Throughput::Elements(sent.len() as u64 * 384));
     group.bench_function("scan", |b| {
         b.iter(|| {

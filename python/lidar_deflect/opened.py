@@ -75,7 +75,7 @@ class OpenedTest:
         load = instruments.load(config)
         return cls(
             config,
-            files,
+            capture.paths,
             capture,
             capture.lidars,
             capture.missing,

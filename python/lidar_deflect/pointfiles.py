@@ -23,6 +23,11 @@ PLAIN = ("sweep", "packet", "block", "ring", "azimuth_deg", "range_m")
 TAIL = ("intensity", "return_index")
 
 
+def frame_ids(block: Block) -> NDArray[np.float64]:
+    """Frame counts of the sensors; NaN where there are none, which no integer could say."""
+    return np.where(block["has_frame_id"], block["frame_id"].astype(np.float64), np.nan)
+
+
 class PointFile(ABC):
     """A file of points that is being written.
 
@@ -83,6 +88,7 @@ class NpzFile(PointFile):
             "time": block["time_ns"].astype("datetime64[ns]"),
             "lidar": lidars[block["lidar"]],
             **{name: block[name] for name in PLAIN},
+            "frame_id": frame_ids(block),
             "x_m": x,
             "y_m": y,
             "z_m": z,
@@ -138,6 +144,7 @@ class _Records(PointFile):
                 ("sweep", "<u4"),
                 ("packet", "<u4"),
                 ("block", "<u2"),
+                ("frame_id", "<f8"),
                 ("ring", "<u2"),
                 ("azimuth_deg", "<f4"),
                 ("range_m", "<f4"),
@@ -176,6 +183,7 @@ class _Records(PointFile):
         records["time"] = self.time(block["time_ns"])
         for name in ("lidar", *PLAIN, *TAIL, "return_kind"):
             records[name] = block[name]
+        records["frame_id"] = frame_ids(block)
         self._stream.write(records.tobytes())
         self.points += len(records)
 

@@ -78,7 +78,7 @@ def _streams(document: Mapping[str, Any]) -> str:
 def _stream(stream: Mapping[str, Any]) -> list[str]:
     return [
         stream["source"],
-        str(stream["port"]),
+        "" if stream["port"] is None else str(stream["port"]),
         stream["model"],
         stream["return_mode"],
         f"{stream['rpm']:.0f}",

@@ -50,6 +50,8 @@ pub struct Placed {
     pub time: Timestamp,
     /// Its times and angles.
     pub head: Head,
+    /// Frame that it belongs to, where the sensor counts them.
+    pub frame_id: Option<u32>,
     /// Packets that are missing before it.
     pub lost: u64,
     /// The clock jumped before it: nothing is known of how far the rotor turned.
@@ -210,7 +212,7 @@ impl SweepCutter {
                 break;
             }
             let to = decoded.before(from, &packet.head, cut_rad - start_rad);
-            open.cloud.extend(&decoded.returns[from..to]);
+            open.cloud.extend(&decoded.cloud, from..to);
             open.seen_rad += packet
                 .head
                 .seen_rad(from_rad - start_rad, cut_rad - start_rad);
@@ -221,7 +223,7 @@ impl SweepCutter {
             (from, from_rad) = (to, cut_rad);
         }
         if let Some(open) = &mut self.open {
-            open.cloud.extend(&decoded.returns[from..]);
+            open.cloud.extend(&decoded.cloud, from..decoded.cloud.len());
             open.seen_rad += packet
                 .head
                 .seen_rad(from_rad - start_rad, end_rad - start_rad);

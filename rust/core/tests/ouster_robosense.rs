@@ -304,7 +304,7 @@ fn check(writer: &Writer, returns: usize, number: u32, at: Echo<'_>) {
     decode(writer, &payload, &mut out);
     let tally = writer.model.tally(&payload);
     assert_eq!(
-        (out.returns.len(), out.merged),
+        (out.cloud.len(), out.merged),
         (tally.points as usize, u64::from(tally.merged)),
         "{id}"
     );
@@ -312,8 +312,8 @@ fn check(writer: &Writer, returns: usize, number: u32, at: Echo<'_>) {
     if is_half && returns == 2 {
         return; // without equal echoes two returns are taken for two shots
     }
-    assert!(!out.returns.is_empty(), "{id}");
-    for echo in &out.returns {
+    assert!(!out.cloud.is_empty(), "{id}");
+    for echo in out.cloud.iter() {
         let units = (f64::from(echo.range_m) / writer.unit_m).round() as u32;
         assert!(
             (f64::from(echo.range_m) - f64::from(units) * writer.unit_m).abs() < 1e-5,
@@ -374,8 +374,8 @@ fn ask_everything(writer: &Writer, decoder: &mut dyn Decoder, payload: &[u8], ou
         mean_rate_rad_per_ns: 1e-8,
     };
     decoder.decode(payload, place, out);
-    assert!(out.returns.len() <= 32 * 1024);
-    for echo in &out.returns {
+    assert!(out.cloud.len() <= 32 * 1024);
+    for echo in out.cloud.iter() {
         assert!(
             echo.xyz_m.iter().all(|metres| metres.is_finite()),
             "{echo:?}"

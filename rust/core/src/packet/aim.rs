@@ -8,14 +8,19 @@ const SMALL_RAD: f64 = 0.02;
 /// Sine and cosine of an angle turned on by a mostly small one.
 #[inline]
 pub fn turn(sin_cos: (f64, f64), by_rad: f64) -> (f64, f64) {
-    let by = if by_rad.abs() < SMALL_RAD {
+    add(sin_cos, small_turn(by_rad))
+}
+
+/// Sine and cosine of a mostly small angle.
+#[inline]
+pub fn small_turn(by_rad: f64) -> (f64, f64) {
+    if by_rad.abs() < SMALL_RAD {
         let square = by_rad * by_rad;
         let sin_by = by_rad * (1.0 - square / 6.0);
         (sin_by, 1.0 - square * (0.5 - square / 24.0))
     } else {
         by_rad.sin_cos()
-    };
-    add(sin_cos, by)
+    }
 }
 
 /// Sine and cosine of the sum of two angles.
@@ -25,7 +30,7 @@ pub fn add((sin, cos): (f64, f64), (sin_by, cos_by): (f64, f64)) -> (f64, f64) {
 }
 
 /// An angle not far outside of one turn brought into [0, 2 pi) of `f32`.
-#[inline]
+#[inline(always)]
 pub fn wrapped(angle_rad: f64) -> f32 {
     let once = if angle_rad >= TAU {
         angle_rad - TAU

@@ -9,6 +9,7 @@ pub mod beams;
 pub mod echoes;
 pub mod hesai;
 pub mod ouster;
+pub mod points;
 pub mod proof;
 pub mod robosense;
 pub mod unit;
@@ -16,9 +17,10 @@ pub mod velodyne;
 pub mod writer;
 
 use crate::angle::{Arc, wrap_turn};
-use crate::cloud::Return;
+use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
+use crate::frame::Sensor;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
@@ -73,6 +75,7 @@ pub static MODELS: &[ModelRef] = &[
     &robosense::ruby::PLUS_48,
     &robosense::airy::AIRY,
     &robosense::airy::FAIRY,
+    &points::POINTS,
 ];
 
 /// What the library must know of one sensor model.
@@ -130,6 +133,11 @@ pub trait Model: Sync + std::fmt::Debug {
     fn sequence_wrap(&self) -> Option<i64> {
         let bits = self.counting().sequence_bits;
         bits.map(|bits| 1_i64 << bits.min(62))
+    }
+
+    /// Number of the frame that a data packet belongs to, where the sensor counts them.
+    fn frame_id(&self, _payload: &[u8]) -> Option<u32> {
+        None
     }
 
     /// Models of the single units that `files` describe, where packets mean nothing without: those that are
@@ -372,7 +380,7 @@ pub struct Place {
 #[derive(Debug, Default)]
 pub struct Decoded {
     /// The returns.
-    pub returns: Vec<Return>,
+    pub cloud: PointCloud<Sensor>,
     /// Encoder azimuth of each return's shot, before the channel's own offset: what sweeps are cut by.
     pub encoder_rad: Vec<f32>,
     /// Second returns that repeat the first and were merged into it.
@@ -395,7 +403,7 @@ impl Decoded {
 
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
-        self.returns.clear();
+        self.cloud.clear();
         self.encoder_rad.clear();
     }
 }

@@ -388,6 +388,13 @@ pub static ROWS: &[Row] = &[
         Proof::RoundTrip,
     ),
     row(
+        "points",
+        "clouds of a bag with a time per point; the project's own magic",
+        "one",
+        "none",
+        Proof::RoundTrip,
+    ),
+    row(
         "fairy",
         "type 0A",
         "one, dual by equal azimuths",

@@ -138,6 +138,10 @@ impl Model for Unit {
         Misfit { why, may_be: None }
     }
 
+    fn frame_id(&self, payload: &[u8]) -> Option<u32> {
+        self.view(payload).map(|view| view.frame())
+    }
+
     fn head(&self, payload: &[u8]) -> Option<Head> {
         let view = self.view(payload)?;
         let span = Span::of(&view)?;
@@ -295,7 +299,7 @@ impl Decoder for UnitDecoder {
                     let Some((xyz_m, azimuth_rad)) = spot else {
                         continue;
                     };
-                    out.returns.push(Return {
+                    out.cloud.push(&Return {
                         xyz_m,
                         time: place.time + since_ns,
                         range_m: (f64::from(range_mm) * 0.001) as f32,

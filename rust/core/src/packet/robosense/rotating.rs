@@ -441,7 +441,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                 let Some(kind) = kind else { continue };
                 let echo = shot.echoes[index];
                 let range_m = f64::from(echo.range) * unit_m;
-                out.returns.push(Return {
+                out.cloud.push(&Return {
                     xyz_m: self.position(laser, range_m, azimuth_rad),
                     time: place.time + turn.start_ns(shot.firing) + shot.slot.delay_ns,
                     range_m: range_m as f32,

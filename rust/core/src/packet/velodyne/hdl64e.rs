@@ -291,7 +291,7 @@ impl Decoder for Hdl64eDecoder {
                     let Some(return_kind) = kind else { continue };
                     let (xyz_m, range_m) = channel.place(echo.range, add(head, channel.rotation));
                     out.encoder_rad.push(wrapped(row_rad + turned_rad));
-                    out.returns.push(Return {
+                    out.cloud.push(&Return {
                         xyz_m: xyz_m.map(|value| value as f32),
                         time: time + channel.delay_ns,
                         range_m: range_m as f32,
