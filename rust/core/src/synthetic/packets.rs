@@ -141,7 +141,7 @@ mod tests {
             };
             fitted.decoder.decode(&payload, place, &mut out);
         }
-        out.returns
+        out.cloud.iter().collect()
     }
 
     #[test]

@@ -156,7 +156,7 @@ fn decode(writer: WriterRef, shots: &Shots) -> Vec<crate::cloud::Return> {
     if let Ok(mut fitted) = writer.model().fit(&writer.files()) {
         fitted.decoder.decode(&writer.write(shots), place, &mut out);
     }
-    out.returns
+    out.cloud.iter().collect()
 }
 
 #[cfg(test)]

@@ -69,7 +69,7 @@ const CELLS: usize = 256;
 #[derive(Debug, Clone)]
 pub struct Ground {
     plan: GroundPlan,
-    fields: [Field; 2],
+    fields: Vec<Field>,
 }
 
 /// Smooth heights over a grid.
@@ -83,11 +83,16 @@ impl Ground {
     /// Draws the heights from `seed`.
     pub fn new(plan: GroundPlan, seed: u64) -> Self {
         let mut stream = Stream::new(seed, Subject::Ground, [0, 0]);
-        let rough = Field::new(&mut stream, plan.roughness_m, plan.correlation_m);
-        let swell = Field::new(&mut stream, plan.swell_m, SWELL * plan.correlation_m);
+        let scales = [
+            (plan.roughness_m, plan.correlation_m),
+            (plan.swell_m, SWELL * plan.correlation_m),
+        ];
+        let scales = scales.into_iter().filter(|(sigma_m, _)| *sigma_m > 0.0);
         Self {
             plan,
-            fields: [rough, swell],
+            fields: scales
+                .map(|(sigma_m, cell_m)| Field::new(&mut stream, sigma_m, cell_m))
+                .collect(),
         }
     }
 
@@ -113,7 +118,7 @@ impl Ground {
             return None;
         }
         let mut range_m = above / sink;
-        for _ in 0..3 {
+        for _ in 0..if self.fields.is_empty() { 0 } else { 3 } {
             let at = ray.at(range_m);
             range_m = (above - self.rough_m(at.x, at.z)) / sink;
         }
