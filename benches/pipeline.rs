@@ -4,18 +4,19 @@
 //! test: 1000 elements a second are real time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use lidar_deflect_core::capture::{DatagramReader, PcapWriter};
+use lidar_deflect_core::capture::{DatagramBatch, DatagramReader, PcapWriter};
 use lidar_deflect_core::cluster::line::LineParams;
 use lidar_deflect_core::cluster::radius::{Intervals, RadiusModel};
 use lidar_deflect_core::fit::arc::SpanAxis;
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::paper::curves::Degrees;
 use lidar_deflect_core::paper::frame::{FrameParams, RadiusRule};
-use lidar_deflect_core::paper::frames::{Frame, FrameAssembler};
+use lidar_deflect_core::paper::frames::Frame;
 use lidar_deflect_core::paper::passthrough::PassThrough;
+use lidar_deflect_core::paper::reader::{FramePlan, FrameReader};
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::{Plane, TipLimits};
-use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, SweepOptions, SweepReader};
+use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport};
 use lidar_deflect_core::synthetic::blade::{BuildErrors, Orientation};
 use lidar_deflect_core::synthetic::echo::Optics;
 use lidar_deflect_core::synthetic::lidar::{Clock, LidarPlan};
@@ -144,25 +145,29 @@ fn scan(bytes: &[u8]) -> ScanReport {
 }
 
 fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<Frame> {
-    let mut reader = DatagramReader::new(bytes).unwrap();
-    let mut sweeps = SweepReader::new(report, &SweepOptions::default()).unwrap();
-    let pass = PassThrough::new([-5.0, -4.0, 70.0], [12.0, 6.0, 111.0]).unwrap();
-    let first = START + PERIOD_NS;
-    let mut assembler = FrameAssembler::new(poses.to_vec(), pass, first, PERIOD_NS).unwrap();
-    let mut take = |sweeps: &mut SweepReader| {
-        while let Some(sweep) = sweeps.pop() {
-            assembler.push(&sweep);
-            sweeps.recycle(sweep.lidar, sweep.cloud);
-        }
+    let mut datagrams = DatagramReader::new(bytes).unwrap();
+    let plan = FramePlan {
+        lidars: (0..poses.len()).collect(),
+        poses: poses.to_vec(),
+        cut_azimuth_rad: vec![0.0; poses.len()],
+        pass: PassThrough::new([-5.0, -4.0, 70.0], [12.0, 6.0, 111.0]).unwrap(),
+        first: START + PERIOD_NS,
+        period_ns: PERIOD_NS,
+        start: START,
+        stop: Timestamp(i64::MAX),
     };
-    while let Some(datagram) = reader.next().unwrap() {
-        sweeps.push(&datagram);
-        take(&mut sweeps);
+    let mut reader = FrameReader::new(report, &plan).unwrap();
+    let mut batch = DatagramBatch::default();
+    while let Some(datagram) = datagrams.next().unwrap() {
+        batch.push(&datagram);
+        if batch.bytes() > 2 << 20 {
+            reader.push(&batch);
+            batch.clear();
+        }
     }
-    sweeps.finish();
-    take(&mut sweeps);
-    assembler.finish();
-    std::iter::from_fn(|| assembler.pop()).collect()
+    reader.push(&batch);
+    reader.finish();
+    std::iter::from_fn(|| reader.pop()).collect()
 }
 
 /// Step 6: the intervals of the distance over the whole test, what the first pass is for.
@@ -228,11 +233,11 @@ fn pipeline(c: &mut Criterion) {
     group.bench_function("the same, a radius per point", |b| {
         b.iter(|| sections(black_box(&assembled), &by_point));
     });
-    group.bench_function("whole, two passes", |b| {
+    group.bench_function("whole", |b| {
         b.iter(|| {
             let report = scan(black_box(&bytes));
-            let rule = rule(&frames(&bytes, &report, &poses), &poses);
-            sections(&frames(&bytes, &report, &poses), &params(&poses, rule))
+            let frames = frames(&bytes, &report, &poses);
+            sections(&frames, &params(&poses, rule(&frames, &poses)))
         });
     });
     group.finish();

@@ -20,6 +20,8 @@ TEXTS = {
     "ouster_ros/msg/PacketMsg": "uint8[] buf\n",
     "rslidar_msg/msg/RslidarPacket": HEADER
     + "uint8 is_difop\nuint8 is_frame_begin\nuint8[] data\n",
+    "rslidar_msgs/msg/rslidarPacket": STAMPED + "uint8[1248] data\n",
+    "rslidar_msgs/msg/rslidarScan": HEADER + "rslidar_msgs/rslidarPacket[] packets\n",
     "livox_ros_driver2/msg/CustomPoint": "uint32 offset_time\nfloat32 x\nfloat32 y\nfloat32 z\n"
     "uint8 reflectivity\nuint8 tag\nuint8 line\n",
     "livox_ros_driver2/msg/CustomMsg": HEADER + "uint64 timebase\nuint32 point_num\n"

@@ -238,6 +238,39 @@ def test_robosense_packets_that_describe_the_unit_come_along(kind: str, tmp_path
     compare(writer.write(tmp_path / "run", entries), path, tmp_path)
 
 
+def test_robosense_packets_of_ros_1_with_a_topic_for_what_describes_the_unit(
+    tmp_path: Path,
+) -> None:
+    path = real("robosense_helios16p_a.pcap")
+    writer = Bags("bag")
+    name, scan = "rslidar_msgs/msg/rslidarPacket", "rslidar_msgs/msg/rslidarScan"
+    entries: list[Entry] = []
+    for time_ns, _, payload in datagrams(path, tmp_path):
+        stamp, data = writer.time(time_ns), octets(payload)
+        packet = writer.message(name, stamp=stamp, data=data)
+        if payload.startswith(b"\xa5\xff\x00\x5a"):
+            entries.append(("/rslidar_packets_difop", name, time_ns, packet))
+        else:
+            message = writer.message(scan, header=writer.header(time_ns), packets=[packet])
+            entries.append(("/rslidar_packets", scan, time_ns, message))
+    ours = compare(writer.write(tmp_path / "run", entries), path, tmp_path)
+    assert set(ours["lidar"]) == {"/rslidar_packets"}
+
+
+def test_a_bag_is_cut_to_a_capture_by_topic_and_time(tmp_path: Path) -> None:
+    writer = Bags("db3")
+    entries = scans(writer, [*puck(0.5)], "/a/packets") + scans(writer, [*puck(0.5)], "/b/packets")
+    bag = writer.write(tmp_path / "run", sorted(entries, key=lambda entry: entry[2]))
+    span = {"lidars": ["/b/packets"], "start_s": 0.1, "stop_s": 0.3}
+    decode.decode(capture.open(bag), tmp_path / "cut.pcap", **span)
+    decode.decode(capture.open(bag), tmp_path / "whole.parquet", **span)
+    cut = points(tmp_path / "cut.pcap", tmp_path / "cut.parquet")
+    whole = tables.read(tmp_path / "whole.parquet")
+    # Packets and turns are counted anew.
+    assert len(cut) == len(whole) > 50_000
+    assert cut.drop("lidar", "packet", "sweep").equals(whole.drop("lidar", "packet", "sweep"))
+
+
 # --- what cannot be read -------------------------------------------------------------------------
 
 
@@ -285,6 +318,16 @@ def test_noise_behind_the_magic_is_an_error_of_the_input(tmp_path: Path) -> None
                 capture.open(path).info()
     with pytest.raises(CaptureNotFoundError):
         capture.open(tmp_path / "absent.bag")
+
+
+@pytest.mark.parametrize(("suffix", "tool"), [("gz", "gzip"), ("zstd", "zstd")])
+def test_a_bag_compressed_as_a_whole_is_told(suffix: str, tool: str, tmp_path: Path) -> None:
+    path = tmp_path / f"run_0.db3.{suffix}"
+    path.write_bytes(b"\x1f\x8b")
+    with pytest.raises(CaptureError) as caught:
+        capture.open(path)
+    assert caught.value.code == "capture.compression"
+    assert caught.value.hint == f"decompress it first: {tool} -dk run_0.db3.{suffix}"
 
 
 def test_without_the_extra_the_command_that_installs_it_is_named(tmp_path: Path) -> None:

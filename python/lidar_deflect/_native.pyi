@@ -261,7 +261,13 @@ class DistancePass:
 @final
 class ContourPass:
     def __new__(
-        cls, plan: FramePlan, params: FrameParams, *, sample_every: int, sample_points: int
+        cls,
+        plan: FramePlan,
+        params: FrameParams,
+        first_pass: DistancePass,
+        *,
+        sample_every: int,
+        sample_points: int,
     ) -> ContourPass: ...
     def advance(
         self,

@@ -343,7 +343,7 @@ class Capture:
                 s.lidar,
                 s.title,
                 s.return_mode,
-                f"{s.rpm:.0f}",
+                "-" if s.rpm is None else f"{s.rpm:.0f}",
                 s.packets,
                 s.lost,
                 s.late,

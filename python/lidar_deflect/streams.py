@@ -28,9 +28,9 @@ class StreamInfo:
         Where the angles of the unit come from; begins with ``missing`` where there are none.
     return_mode
         ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with
-        its two returns in parentheses.
+        its two returns in parentheses; ``single`` where packets do not tell which it is.
     rpm
-        Turns a minute in the mean.
+        Turns a minute in the mean; None for sensors without a rotor.
     packets, lost, duplicated, late, too_late, foreign
         Data packets that were taken, that never came, came twice, came out of order, came too
         late to be put back; datagrams of the stream that are not the lidar's.
@@ -63,7 +63,7 @@ class StreamInfo:
     named: bool
     beams: str
     return_mode: str
-    rpm: float
+    rpm: float | None
     packets: int
     lost: int
     duplicated: int

@@ -1,5 +1,6 @@
 """What a file is by its first bytes, and what is needed to read it."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +13,9 @@ ROS2 = "ROS 2 bag (SQLite)"
 MCAP = "MCAP"
 
 MAGICS = ((b"#ROSBAG V2.0", ROS1), (b"SQLite format 3\0", ROS2), (b"\x89MCAP0\r\n", MCAP))
+
+PACKED = re.compile(r"\.(bag|db3|mcap)\.(gz|zst|zstd)$")
+"""A bag must be read at any place, which a file compressed as a whole does not allow."""
 
 METADATA = "metadata.yaml"
 """What makes a folder a ROS 2 bag."""
@@ -28,13 +32,20 @@ def kind_of(path: Path) -> str | None:
 
 
 def located(path: Path) -> list[Path]:
-    """Storage files of a ROS 2 bag given as its folder; any other path as it is.
+    """Locate the storage files of a ROS 2 bag given as its folder; any other path stays.
 
     Raises
     ------
     CaptureError
-        If the folder of a bag holds none (``capture.bag_empty``).
+        If the folder of a bag holds none (``capture.bag_empty``), or a bag is compressed as a whole
+        (``capture.compression``).
     """
+    if match := PACKED.search(path.name):
+        raise CaptureError(
+            f"{path}: expected a bag, found a compressed one",
+            code="capture.compression",
+            hint=f"decompress it first: {'gzip' if match[2] == 'gz' else 'zstd'} -dk {path.name}",
+        )
     if not (path / METADATA).is_file():
         return [path]
     files = sorted(entry for entry in path.iterdir() if kind_of(entry) in (ROS2, MCAP))

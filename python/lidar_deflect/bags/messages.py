@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["Datagram", "datagrams", "stamp_ns"]
+__all__ = ["DESCRIPTION_PORT", "Datagram", "datagrams", "stamp_ns"]
 
 NANOS_PER_SECOND = 1_000_000_000
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from lidar_deflect.bags.clouds import custom, point_cloud
 from lidar_deflect.bags.definitions import CUSTOM, METADATA, PACKETS
-from lidar_deflect.bags.messages import datagrams
+from lidar_deflect.bags.messages import DESCRIPTION_PORT, datagrams
 from lidar_deflect.bags.packing import PointPacker
 from lidar_deflect.bags.pcap import LARGEST_BYTES, PcapFile
 from lidar_deflect.bags.reading import CLOUD_ROLES, LIDAR_ROLES, Bag, Message, looked_at
@@ -241,12 +241,14 @@ class _Work:
             self._points(lane, message)
 
     def _packets(self, lane: _Lane, message: Message) -> None:
+        is_companion = message.topic not in self._topics.names.values()
         for datagram in datagrams(message.body, message.kind):
+            port = DESCRIPTION_PORT if is_companion else datagram.port
             time_ns = lane.time_ns(datagram.stamp_ns, message.time_ns)
             if not 0 < len(datagram.payload) <= LARGEST_BYTES:
                 self._drop("datagram_size")
             else:
-                lane.file.write(time_ns, datagram.port, datagram.payload)
+                lane.file.write(time_ns, port, datagram.payload)
 
     def _points(self, lane: _Lane, message: Message) -> None:
         try:

@@ -7,7 +7,9 @@
 pub mod aim;
 pub mod beams;
 pub mod echoes;
+pub mod frames;
 pub mod hesai;
+pub mod livox;
 pub mod ouster;
 pub mod points;
 pub mod proof;
@@ -21,6 +23,7 @@ use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
 use crate::frame::Sensor;
+use crate::loss::cycle::Restarts;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
@@ -75,6 +78,21 @@ pub static MODELS: &[ModelRef] = &[
     &robosense::ruby::PLUS_48,
     &robosense::airy::AIRY,
     &robosense::airy::FAIRY,
+    &robosense::solid::sensor::M1,
+    &robosense::solid::sensor::M1_PLUS,
+    &robosense::solid::sensor::M2,
+    &robosense::solid::sensor::M3,
+    &robosense::solid::sensor::MX,
+    &robosense::solid::sensor::E1,
+    &robosense::solid::sensor::EMX,
+    &robosense::solid::sensor::EM4,
+    &livox::sensor::MID_40,
+    &livox::sensor::MID_70,
+    &livox::sensor::AVIA,
+    &livox::sensor::HORIZON,
+    &livox::sensor::TELE_15,
+    &livox::sensor::MID_360,
+    &livox::sensor::HAP,
     &points::POINTS,
 ];
 
@@ -133,6 +151,16 @@ pub trait Model: Sync + std::fmt::Debug {
     fn sequence_wrap(&self) -> Option<i64> {
         let bits = self.counting().sequence_bits;
         bits.map(|bits| 1_i64 << bits.min(62))
+    }
+
+    /// How the sequence number starts again with every frame, where it does.
+    fn restarts(&self) -> Option<Restarts> {
+        None
+    }
+
+    /// Whether a rotor turns the beams. Others send frame after frame: one frame counts as one turn.
+    fn has_rotor(&self) -> bool {
+        true
     }
 
     /// Number of the frame that a data packet belongs to, where the sensor counts them.

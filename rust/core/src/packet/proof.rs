@@ -7,6 +7,8 @@ pub enum Proof {
     RealPackets(&'static str),
     /// Real packets of a sibling with the same layout and timing; only the angles are the model's own.
     Sibling(&'static str),
+    /// Numbers that the manual works out for one point come out; the rest is round trip.
+    WorkedExample(&'static str),
     /// What is written is read again; layout and tables come from manuals and the maker's programs.
     RoundTrip,
 }
@@ -21,6 +23,9 @@ impl Proof {
             Self::Sibling(id) => format!(
                 "round trip only; real packets of `{id}`, whose layout and timing it shares"
             ),
+            Self::WorkedExample(what) => {
+                format!("worked example of the manual: {what}; else round trip only")
+            }
             Self::RoundTrip => "round trip only".into(),
         }
     }
@@ -399,6 +404,111 @@ pub static ROWS: &[Row] = &[
         "type 0A",
         "one, dual by equal azimuths",
         "DIFOP packets; else no points",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-m1",
+        "1210 bytes, `55 AA 5A A5`, type 10; an M1 Plus looks the same",
+        "strongest, last, first; dual by the return number of a block",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-m1-plus",
+        "cannot be told from `rs-m1`: only when it is named",
+        "as `rs-m1`",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-m2",
+        "1342 bytes, `55 AA 5A A5`",
+        "strongest, last, first; dual by the return number of a block",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-m3",
+        "1448 bytes, `55 AA 5A A5`",
+        "strongest, last, first",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-mx",
+        "1404 bytes, `55 AA 5A A5`",
+        "strongest, last, first, dual",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-e1",
+        "1200 bytes, `55 AA 5A A5`, type 62",
+        "strongest, last, first",
+        "done in the sensor; DIFOP packets tell serial number and clock",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-emx",
+        "812 bytes, `55 AA 5A A5`, type 42",
+        "strongest, last, first, dual (first, last)",
+        "DIFOP2 packets; else nominal",
+        Proof::RoundTrip,
+    ),
+    row(
+        "rs-em4",
+        "1084 bytes, `55 AA 5A A5`, type 70; packets of the compressed mode are not read",
+        "strongest, last, first, dual (first, second)",
+        "DIFOP2 packets; else no points",
+        Proof::WorkedExample("yaw, pitch and time of one pixel of an EM4"),
+    ),
+    row(
+        "mid-40",
+        "first protocol, types 0 and 1, 1000 us between packets; one head of a Mid-100 is one",
+        "one (which, the packets do not tell)",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "mid-70",
+        "first protocol, types 2 to 8, 960 us between packets (480 us with two returns)",
+        "one; first, second; first, second, last",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "avia",
+        "first protocol, types 2 to 8, 400 us between packets (200 us, 125 us with two, three returns); a Horizon or Tele-15 looks the same",
+        "one; first, second; first, second, last",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "horizon",
+        "cannot be told from `avia`: only when it is named",
+        "as `avia`",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "tele-15",
+        "cannot be told from `avia`: only when it is named",
+        "as `avia`",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "mid-360",
+        "second protocol, 5 us between points",
+        "one (which, the packets do not tell); two",
+        "done in the sensor",
+        Proof::RoundTrip,
+    ),
+    row(
+        "hap",
+        "second protocol, 2.2 us between points",
+        "one (which, the packets do not tell); two",
+        "done in the sensor",
         Proof::RoundTrip,
     ),
 ];

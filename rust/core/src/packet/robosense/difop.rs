@@ -135,16 +135,21 @@ impl<'a> Difop<'a> {
 
 /// The packet in a file: the packet itself, or the first one of a capture.
 pub fn packet(file: &UnitFile) -> Option<[u8; LEN]> {
+    find(file, |payload| Difop::new(payload).map(|difop| *difop.0))
+}
+
+/// What `take` takes of a file: of the file itself, or of the first datagram of a capture that it takes.
+pub(super) fn find<T>(file: &UnitFile, take: impl Fn(&[u8]) -> Option<T>) -> Option<T> {
     /// A capture has one a second.
     const MOST_DATAGRAMS: usize = 1_000_000;
-    if let Some(difop) = Difop::new(&file.content) {
-        return Some(*difop.0);
+    if let Some(taken) = take(&file.content) {
+        return Some(taken);
     }
     let mut reader = DatagramReader::new(&file.content[..]).ok()?;
     for _ in 0..MOST_DATAGRAMS {
         let datagram = reader.next().ok()??;
-        if let Some(difop) = Difop::new(datagram.payload) {
-            return Some(*difop.0);
+        if let Some(taken) = take(datagram.payload) {
+            return Some(taken);
         }
     }
     None
