@@ -190,7 +190,10 @@ class Lidar(Model):
     """A lidar on the ground."""
 
     id: Name
-    model: str = Field(default="vlp16", description="see docs/sensors.md for what can be simulated")
+    model: str = Field(
+        default="vlp16",
+        description="id of a sensor; one that cannot be simulated is refused with a list",
+    )
     address: Annotated[str, Field(pattern=r"^\d{1,3}(\.\d{1,3}){3}$")]
     port: Annotated[int, Field(gt=0, lt=65536)] = 2368
     position_m: Point = Field(description="optical centre")
