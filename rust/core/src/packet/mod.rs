@@ -17,6 +17,7 @@ pub mod proof;
 pub mod robosense;
 pub mod unit;
 pub mod velodyne;
+pub mod writer;
 
 use crate::angle::{Arc, wrap_turn};
 use crate::cloud::PointCloud;

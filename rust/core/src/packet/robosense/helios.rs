@@ -12,7 +12,7 @@
 use std::sync::LazyLock;
 
 use super::difop::{Angles, Difop};
-use super::layout::{ID, Layout, Stamp, View, kind, type_of};
+use super::layout::{ID, Layout, Stamp, View, field, kind, type_of};
 use super::rotating::{Family, Lens, Rotating, Slot};
 use super::table::Table;
 use crate::packet::ReturnMode;
@@ -120,6 +120,13 @@ impl Family for Helios {
             "the header names no model (firmware of 2021): decoded as helios16p; {seen}; \
              if it has 32 lasers, name it: --sensor SOURCE=helios32"
         ))
+    }
+
+    fn header(&self) -> Vec<(usize, u8)> {
+        vec![
+            (field::TYPE.start + 1, TYPE),
+            (field::TYPE.start + 2, self.model_byte()),
+        ]
     }
 
     fn lasers(&self) -> usize {

@@ -82,6 +82,11 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
         None
     }
 
+    /// Bytes by which the header names the model, by place.
+    fn header(&self) -> Vec<(usize, u8)> {
+        Vec::new()
+    }
+
     /// Number of lasers.
     fn lasers(&self) -> usize;
 

@@ -12,6 +12,7 @@ pub(super) mod rotation;
 mod rows;
 pub mod vlp32;
 pub mod vls128;
+pub mod writer;
 
 use crate::packet::echoes::RawEcho;
 use crate::packet::{Misfit, ReturnMode};
