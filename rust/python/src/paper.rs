@@ -14,7 +14,7 @@ use crate::arrays;
 use crate::compute::compute;
 use crate::error::BorderResult;
 use feed::FrameFeed;
-pub use feed::FramePlan;
+pub use feed::{FramePlan, cuts};
 pub use params::FrameParams;
 
 /// Adds this file's classes to the module.

@@ -84,7 +84,7 @@ impl FramePlan {
 }
 
 /// Cut azimuths by number of the lidar, as the reader wants them.
-fn cuts(lidars: &[usize], degrees: &[f64]) -> Vec<f64> {
+pub fn cuts(lidars: &[usize], degrees: &[f64]) -> Vec<f64> {
     let mut by_number = vec![0.0; lidars.iter().max().map_or(0, |last| last + 1)];
     for (number, cut) in lidars.iter().zip(degrees) {
         by_number[*number] = cut.to_radians();
