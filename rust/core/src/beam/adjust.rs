@@ -1,5 +1,7 @@
 //! One adjustment of all holds: states, surface, lidars and edges from rays, edges and what is known.
 
+use std::ops::Range;
+
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
@@ -14,14 +16,22 @@ use super::posed::{Posed, knots};
 use super::rig::{Lidar, Rig};
 use super::rows::{Rows, Tally, Weights};
 use super::shape::Shape;
+use super::track::zeros;
 use crate::error::BeamError;
 
-/// Standard deviations of the sway in its first and second mode, metres at the tip.
-const SWAY_M: [f64; 2] = [0.05, 0.015];
+/// Standard deviations of the sway in its first mode in x and y and in its second, metres at the tip.
+const SWAY_M: [f64; 4] = [0.05, 0.05, 0.015, 0.015];
+/// Time between two knots of the sway in a hold, nanoseconds.
+const KNOT_NS: i64 = 200_000_000;
+/// Largest step of an unknown, standard deviations: farther away the neighbours are not linear.
+const LARGEST_STEP: f64 = 3.0;
 /// Standard deviation of how far edges lie outside of the silhouette, rad.
 pub const EDGE_RAD: f64 = 1e-3;
 /// The same of one hold, lidar and side against all, rad.
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
+
+/// Data are taken for no better than this share of the gate while the gate is wide.
+const COARSE: f64 = 0.1;
 
 /// Inverse variance of what is held, against 1 of what is free.
 const HELD: f64 = 1e6;
@@ -48,6 +58,8 @@ pub struct Problem {
     pub trust: Trust,
     /// Its surface.
     pub shape: Shape,
+    /// Force of full load at each saddle, newtons, world.
+    pub full_n: Vec<Vector3<f64>>,
     /// The holds in time order.
     pub holds: Vec<Hold>,
 }
@@ -59,8 +71,19 @@ pub struct Gates {
     pub echo_m: f64,
     /// Of edges across it.
     pub edge_m: f64,
-    /// Whether lidars and surface may change: not before the blade is found, or saddles bend them.
-    pub is_free: bool,
+    /// What may change.
+    pub stage: Stage,
+}
+
+/// What may change while the blade is being found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Forces and weight alone: nothing else can bring a blade that is metres away nearer.
+    Loads,
+    /// The blade, not yet lidars and surface, or saddles would bend them.
+    Blade,
+    /// Everything.
+    All,
 }
 
 /// A state of which the neighbours are known.
@@ -85,8 +108,19 @@ pub struct Adjustment {
     pub values: DVector<f64>,
     /// How data are weighted.
     pub weights: Weights,
-    shared: Vec<Unknown>,
-    own: Vec<Vec<Unknown>>,
+    /// Which unknowns are solved for.
+    pub free: Range<usize>,
+    /// Standard deviation of each mode in time, in its own unit.
+    pub modes_m: Vec<f64>,
+    /// Expected values before the data, in standard deviations, and their weights.
+    pub(super) expected: DVector<f64>,
+    pub(super) tightness: DVector<f64>,
+    /// Time between two knots, nanoseconds.
+    pub(super) knot_ns: i64,
+    /// Whether the first mode in time is the load.
+    pub(super) follows_load: bool,
+    pub(super) shared: Vec<Unknown>,
+    pub(super) own: Vec<Vec<Unknown>>,
     linear: Vec<Linear>,
 }
 
@@ -108,17 +142,23 @@ impl Adjustment {
         let shared = family::shared_unknowns(&problem.trust);
         let own = |hold: &Hold| family::hold_unknowns(&hold.loading, &problem.trust);
         let own: Vec<Vec<Unknown>> = problem.holds.iter().map(own).collect();
-        let span = |hold: &Hold| knots(hold.span_ns.1 - hold.span_ns.0);
+        let span = |hold: &Hold| knots(hold.span_ns, KNOT_NS);
         let layout = Layout {
             shared: shared.len(),
             own: own.iter().map(Vec::len).collect(),
             knots: problem.holds.iter().map(span).collect(),
-            modes: 2 * SWAY_M.len(),
+            modes: SWAY_M.len(),
             channels: rig.channels.clone(),
             shape: problem.shape.len(),
         };
         let mut adjustment = Self {
             values: DVector::zeros(layout.len()),
+            expected: DVector::zeros(layout.len()),
+            tightness: DVector::repeat(layout.len(), 1.0),
+            free: 0..layout.len(),
+            modes_m: SWAY_M.to_vec(),
+            knot_ns: KNOT_NS,
+            follows_load: false,
             layout,
             rig,
             weights,
@@ -153,8 +193,13 @@ impl Adjustment {
         let at = physics.solve(mesh, &start)?;
         let mut responses = family::responses(mesh, &physics, &at, &self.shared)?;
         responses.extend(self.own_responses(hold, &physics, &at, &responses)?);
+        let mut sway = family::sway_responses(mesh, &at);
+        if self.follows_load {
+            let load = Unknown { kind: Kind::Load, sigma: 1.0 };
+            sway.insert(0, family::responses(mesh, &physics, &at, &[load])?.pop()?);
+        }
         Some(Linear {
-            sway: family::sway_responses(mesh, &at),
+            sway,
             curvature: at.curvature,
             values: self.state(hold),
             responses,
@@ -174,18 +219,33 @@ impl Adjustment {
         self.own[hold].iter().map(respond).collect()
     }
 
-    fn physics(&self, hold: usize) -> Physics {
+    /// Everything that bends the blade in a hold, as estimated so far.
+    pub(super) fn physics(&self, hold: usize) -> Physics {
         let problem = &self.problem;
         let mut physics = Physics::unloaded(&problem.mesh, &problem.saddles);
         for (place, force) in physics.forces.iter_mut().zip(&problem.holds[hold].loading.force_n) {
             place.1 += force;
         }
+        physics.full.clone_from(&problem.full_n);
         let state = self.state(hold);
         let unknowns = self.shared.iter().chain(&self.own[hold]);
         for (unknown, value) in unknowns.zip(state.iter()) {
             family::add(&mut physics, &problem.mesh, unknown.kind, unknown.sigma * value);
         }
         physics
+    }
+
+    /// Another problem with these lidars and weights, without values.
+    pub(super) fn like(&self, problem: Problem, layout: Layout) -> Self {
+        Self {
+            values: zeros(layout.len()),
+            expected: zeros(layout.len()),
+            tightness: DVector::repeat(layout.len(), 1.0),
+            linear: Vec::new(),
+            problem,
+            layout,
+            ..self.clone()
+        }
     }
 
     /// Shared and own unknowns of a hold.
@@ -219,10 +279,10 @@ impl Adjustment {
         let still = Axis::integrate(&turn, &problem.mesh.s_m, curvature);
         let at = self.layout.sway_at(hold);
         let coefficients: Vec<f64> = (0..self.layout.modes * self.layout.knots[hold])
-            .map(|k| self.values[at + k] * sway_m(k / self.layout.knots[hold]))
+            .map(|k| self.values[at + k] * self.modes_m[k / self.layout.knots[hold]])
             .collect();
         let span = problem.holds[hold].span_ns;
-        Posed::new(&problem.mesh, still, &linear.responses, &linear.sway, &coefficients, span)
+        Posed::new(&problem.mesh, still, &linear.responses, &linear.sway, &coefficients, span, self.knot_ns)
     }
 
     /// One step of Gauss and Newton with data inside of the gates.
@@ -231,13 +291,20 @@ impl Adjustment {
     /// [`BeamError::Singular`].
     pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
         let (normal, tallies) = self.normal(gates);
-        let (step, _) = normal.solve().ok_or(BeamError::Singular)?;
-        self.values += &step;
+        let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
+        let mut step = DVector::zeros(self.layout.len());
+        step.rows_mut(self.free.start, self.free.len()).copy_from(&part);
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        let largest = step.rows(0, self.layout.sway_at(0)).amax();
+        if largest > LARGEST_STEP {
+            step *= LARGEST_STEP / largest;
+        }
+        self.values += &step;
         self.rig.values += step.rows(rig, count);
         self.values.rows_mut(rig, count).fill(0.0);
-        let largest = step.rows(0, rig).amax();
-        self.weights.learn(&tallies);
+        if gates.stage == Stage::All {
+            self.weights.learn(&tallies);
+        }
         Ok(Step { largest, tallies })
     }
 
@@ -248,7 +315,7 @@ impl Adjustment {
             .into_par_iter()
             .map(|hold| Rows::new(self, hold, &lidars, gates).collect())
             .collect();
-        let mut sum = self.prior(gates.is_free);
+        let mut sum = self.prior(gates.stage);
         let mut tallies = Vec::new();
         for (normal, tally) in parts {
             sum.join(&normal);
@@ -257,28 +324,52 @@ impl Adjustment {
         (sum, tallies)
     }
 
-    /// What is known before the data.
-    fn prior(&self, is_free: bool) -> Normal {
-        let mut prior = Normal::new(self.layout.len());
-        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
-        for i in 0..self.layout.len() {
-            let is_held = !is_free && i >= rig;
-            prior.matrix[(i, i)] = if is_held { HELD } else { 1.0 };
-            prior.right[i] = -self.values[i];
+    /// The first stage at which an unknown may change.
+    fn needs(&self, unknown: usize) -> Stage {
+        if unknown >= self.layout.lidar_at(0) {
+            return Stage::All;
         }
-        prior.matrix.view_mut((rig, rig), (count, count)).copy_from(&self.rig.information);
-        let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
-        prior.right.rows_mut(rig, count).copy_from(&pull);
-        if !is_free {
-            (rig..rig + count).for_each(|i| prior.matrix[(i, i)] += HELD * prior.matrix[(i, i)]);
+        let kind = if unknown < self.layout.shared {
+            Some(self.shared[unknown].kind)
+        } else {
+            self.own.iter().flatten().nth(unknown - self.layout.shared).map(|own| own.kind)
+        };
+        match kind {
+            Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
+            _ => Stage::Blade,
+        }
+    }
+
+    /// What is known before the data.
+    fn prior(&self, stage: Stage) -> Normal {
+        let mut prior = Normal::new(self.free.clone());
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        for (place, i) in self.free.clone().enumerate() {
+            let is_held = self.needs(i) > stage;
+            let tight = if is_held { HELD } else { self.tightness[i] };
+            prior.matrix[(place, place)] = tight;
+            prior.right[place] = tight * (self.expected[i] - self.values[i]);
+        }
+        if self.free.contains(&rig) {
+            let at = rig - self.free.start;
+            let hold = if stage == Stage::All { 1.0 } else { HELD };
+            let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
+            let information = &self.rig.information * hold;
+            prior.matrix.view_mut((at, at), (count, count)).copy_from(&information);
+            prior.right.rows_mut(at, count).copy_from(&(pull * hold));
         }
         prior
     }
 }
 
-/// Standard deviation of a mode of the sway, metres at the tip.
-pub fn sway_m(mode: usize) -> f64 {
-    SWAY_M[mode / 2]
+impl Gates {
+    /// Standard deviation below which no echo and no edge is taken to be, metres.
+    pub fn coarse_m(&self) -> [f64; 2] {
+        match self.stage {
+            Stage::All => [0.0; 2],
+            _ => [COARSE * self.echo_m, COARSE * self.edge_m],
+        }
+    }
 }
 
 impl Response {

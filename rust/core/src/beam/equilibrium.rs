@@ -8,7 +8,9 @@ use super::mesh::Mesh;
 const GRAVITY_M_S2: f64 = 9.81;
 /// Share of the step towards what the moments ask for; a whole step overshoots under large bends.
 const RELAXATION: f64 = 0.6;
-const MAX_STEPS: usize = 400;
+/// Smallest share of the step; a share that does not bring it nearer is made smaller.
+const SLOWEST: f64 = 0.05;
+const MAX_STEPS: usize = 600;
 /// Largest change of any curvature in the last step, rad/m.
 const CONVERGED_RAD_M: f64 = 1e-11;
 
@@ -17,6 +19,8 @@ const CONVERGED_RAD_M: f64 = 1e-11;
 pub struct Physics {
     /// Node and world force of every place where load enters, newtons.
     pub forces: Vec<(usize, Vector3<f64>)>,
+    /// What full load adds at the same places, newtons.
+    pub full: Vec<Vector3<f64>>,
     /// Moment about the tangent at the same places, newton metres.
     pub couples_nm: Vec<f64>,
     /// Weight over the guess, by element.
@@ -37,6 +41,7 @@ impl Physics {
         let elements = mesh.len() - 1;
         Self {
             forces: saddles.iter().map(|node| (*node, Vector3::zeros())).collect(),
+            full: vec![Vector3::zeros(); saddles.len()],
             couples_nm: vec![0.0; saddles.len()],
             weight: vec![1.0; elements],
             soft: [(); 3].map(|()| vec![1.0; elements]),
@@ -55,13 +60,14 @@ impl Physics {
     pub fn solve(&self, mesh: &Mesh, start: &[Vector3<f64>]) -> Option<Axis> {
         let root = self.root(mesh);
         let mut axis = Axis::integrate(&root, &mesh.s_m, start.to_vec());
+        let (mut relaxation, mut last) = (RELAXATION, f64::INFINITY);
         for _ in 0..MAX_STEPS {
             let wanted = self.curvatures(mesh, &axis);
             let mut largest: f64 = 0.0;
             let mix = |(now, wanted): (&Vector3<f64>, Vector3<f64>)| {
                 let change = wanted - now;
                 largest = largest.max(change.amax());
-                now + change * RELAXATION
+                now + change * relaxation
             };
             let next = axis.curvature.iter().zip(wanted).map(mix).collect();
             axis = Axis::integrate(&root, &mesh.s_m, next);
@@ -71,6 +77,10 @@ impl Physics {
             if largest < CONVERGED_RAD_M {
                 return Some(axis);
             }
+            if largest > 0.9 * last {
+                relaxation = (0.7 * relaxation).max(SLOWEST);
+            }
+            last = largest;
         }
         None
     }

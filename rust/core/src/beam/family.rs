@@ -27,6 +27,8 @@ pub enum Kind {
         /// Number of the saddle.
         saddle: usize,
     },
+    /// Load, as a share of full load.
+    Load,
     /// Weight, relative, as a function along the span.
     Weight(usize),
     /// Compliance, relative: 0 edgewise, 1 flapwise, 2 torsion; as a function along the span.
@@ -81,7 +83,7 @@ impl Default for Trust {
     fn default() -> Self {
         Self {
             stiffness: 0.05,
-            weight: 0.3,
+            weight: 0.5,
             prebend: 0.05,
             free_rad_m: 1.5e-5,
             root_rad: 1e-3,
@@ -164,6 +166,10 @@ pub fn add(physics: &mut Physics, mesh: &Mesh, kind: Kind, value: f64) {
     let elements = 0..mesh.len() - 1;
     match kind {
         Kind::Force { saddle, axis } => physics.forces[saddle].1[axis] += value,
+        Kind::Load => {
+            let places = physics.forces.iter_mut().zip(&physics.full);
+            places.for_each(|(place, full)| place.1 += full * value);
+        }
         Kind::Couple { saddle } => physics.couples_nm[saddle] += value,
         Kind::Weight(mode) => elements.for_each(|e| physics.weight[e] += value * wave(e, mode)),
         Kind::Soft { which, mode } => {

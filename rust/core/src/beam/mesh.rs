@@ -39,7 +39,7 @@ pub struct Mesh {
 
 /// Bending stiffness over mass and chord squared, N m^2 / (kg/m m^2): glass and carbon blades lie
 /// near it, and the weight is estimated.
-const STIFFNESS_PER_MASS: f64 = 1.6e6;
+const STIFFNESS_PER_MASS: f64 = 3e6;
 
 impl Mesh {
     /// Cuts a blade, with nodes at the stations of the drawing and at `extra_m`.

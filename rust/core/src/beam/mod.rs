@@ -22,3 +22,4 @@ pub mod shape;
 pub mod sight;
 pub mod start;
 mod table;
+pub mod track;

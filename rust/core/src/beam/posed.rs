@@ -10,18 +10,16 @@ use super::sight::{Instant, Section};
 
 /// Time between two shapes of the blade, nanoseconds; linear in between.
 const GRID_NS: i64 = 20_000_000;
-/// Time between two knots of the sway, nanoseconds.
-pub const KNOT_NS: i64 = 200_000_000;
-
-/// Coefficients of the sway over so long a time.
-pub fn knots(duration_ns: i64) -> usize {
-    (duration_ns.max(0) / KNOT_NS) as usize + 4
+/// Coefficients of cubic splines with knots so far apart over a span of time.
+pub fn knots(span_ns: (i64, i64), knot_ns: i64) -> usize {
+    ((span_ns.1 - span_ns.0).max(0) / knot_ns) as usize + 4
 }
 
 /// The blade of one hold.
 #[derive(Debug, Clone)]
 pub struct Posed {
     start_ns: i64,
+    knot_ns: i64,
     shapes: Vec<Axis>,
     /// Without sway.
     pub still: Axis,
@@ -46,14 +44,15 @@ impl Posed {
         sway: &[Response],
         coefficients: &[f64],
         span_ns: (i64, i64),
+        knot_ns: i64,
     ) -> Self {
         let fields = |all: &[Response]| -> Vec<Field> {
             all.iter().map(|r| still.field(&mesh.s_m, &r.curvature, &r.root_rad)).collect()
         };
-        let knots = knots(span_ns.1 - span_ns.0);
+        let knots = knots(span_ns, knot_ns);
         let steps = (span_ns.1 - span_ns.0) / GRID_NS + 2;
         let shape = |step: i64| {
-            let (first, weights) = splines((step * GRID_NS) as f64 / KNOT_NS as f64, knots);
+            let (first, weights) = splines((step * GRID_NS) as f64 / knot_ns as f64, knots);
             let mut curvature = still.curvature.clone();
             for (mode, response) in sway.iter().enumerate() {
                 let of = &coefficients[mode * knots..][..knots];
@@ -65,6 +64,7 @@ impl Posed {
         };
         Self {
             start_ns: span_ns.0,
+            knot_ns,
             shapes: (0..steps).map(shape).collect(),
             moves: flat(mesh, &fields(responses)),
             sway_moves: flat(mesh, &fields(sway)),
@@ -98,7 +98,7 @@ impl Posed {
 
     /// Knots of the sway at an instant.
     pub fn beat(&self, time_ns: i64) -> Beat {
-        splines((time_ns - self.start_ns) as f64 / KNOT_NS as f64, self.knots)
+        splines((time_ns - self.start_ns) as f64 / self.knot_ns as f64, self.knots)
     }
 
     /// How far each unknown of the state moves `along . displacement + about . rotation` of a

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, sway_m};
+use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates};
 use super::echoes::{Echo, Edge};
 use super::layout::RIG;
 use super::normal::Normal;
@@ -35,8 +35,8 @@ pub struct Weights {
 /// What became of the data of a hold.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
-    /// Residuals of the echoes, metres, with their lidar.
-    pub residuals: Vec<(usize, f64)>,
+    /// Echoes that counted.
+    pub used: Vec<Used>,
     /// Residuals of the edges in steps between shots, with lidar and side.
     pub edges: Vec<(usize, usize, f64)>,
     /// Echoes whose rays miss the blade.
@@ -49,12 +49,29 @@ pub struct Tally {
     pub edges_left_out: [usize; 3],
 }
 
+/// An echo that counted.
+#[derive(Debug, Clone, Copy)]
+pub struct Used {
+    /// Instant, nanoseconds.
+    pub time_ns: i64,
+    /// Number of the lidar.
+    pub lidar: usize,
+    /// Number of the beam.
+    pub ring: usize,
+    /// Arc length at which its ray meets the model, metres.
+    pub s_m: f64,
+    /// Measured minus modelled range, metres.
+    pub residual_m: f64,
+    /// Measured point, world, metres.
+    pub point: Vector3<f64>,
+}
+
 impl Weights {
     /// Takes the noise of each lidar from the residuals: 1.48 of their median size.
     pub fn learn(&mut self, tallies: &[Tally]) {
         for lidar in 0..self.noise_m.len() {
             let of = |t: &Tally| -> Vec<f64> {
-                t.residuals.iter().filter(|r| r.0 == lidar).map(|r| r.1.abs()).collect()
+                t.used.iter().filter(|u| u.lidar == lidar).map(|u| u.residual_m.abs()).collect()
             };
             let mut sizes: Vec<f64> = tallies.iter().flat_map(of).collect();
             if sizes.len() > 200 {
@@ -87,7 +104,7 @@ impl<'a> Rows<'a> {
             hold,
             posed: adjustment.posed(hold),
             state: adjustment.state_at(hold),
-            normal: Normal::new(adjustment.layout.len()),
+            normal: Normal::new(adjustment.free.clone()),
             tally: Tally::default(),
             adjustment,
         }
@@ -122,12 +139,20 @@ impl<'a> Rows<'a> {
         }
         let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring);
         let weights = &self.adjustment.weights;
-        let sigma = weights.noise_m[echo.lidar].hypot(weights.surface_m / hit.cosine);
+        let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
+        let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
             self.tally.rejected += 1;
             return arc_m;
         }
-        self.tally.residuals.push((echo.lidar, residual));
+        self.tally.used.push(Used {
+            time_ns: echo.time_ns,
+            lidar: echo.lidar,
+            ring: echo.ring,
+            s_m: self.arc_m(&hit.contact),
+            residual_m: residual,
+            point: lidar.origin + direction * (hit.range_m + residual),
+        });
         let mut row = self.echo_row(echo, &hit);
         let weight = robust(residual, sigma, self.gates.echo_m) / (sigma * sigma);
         self.normal.add(&mut row, residual, weight);
@@ -174,7 +199,7 @@ impl<'a> Rows<'a> {
         for (mode, slope) in sway.enumerate() {
             let first = layout.sway_at(self.hold) + mode * layout.knots[self.hold] + knot;
             let parts = weights.iter().enumerate();
-            row.extend(parts.map(|(k, weight)| (first + k, slope * weight * sway_m(mode))));
+            row.extend(parts.map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])));
         }
         problem.shape.slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
@@ -212,7 +237,9 @@ impl<'a> Rows<'a> {
         let values = &self.adjustment.values;
         let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
         let residual = 0.5 * step_rad - silhouette.angle_rad - outside;
-        let sigma = (step_rad / 12f64.sqrt()).hypot(self.adjustment.weights.edge_rad);
+        let coarse_rad = self.gates.coarse_m()[1] / silhouette.range_m;
+        let sigma_rad = self.adjustment.weights.edge_rad.hypot(coarse_rad);
+        let sigma = (step_rad / 12f64.sqrt()).hypot(sigma_rad);
         let gate_rad = (self.gates.edge_m / silhouette.range_m).max(4.0 * sigma);
         let depth_m = (edge.range_m - silhouette.range_m).abs();
         if residual.abs() > gate_rad || depth_m > self.gates.echo_m.max(0.5) {

@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
-use super::adjust::{Adjustment, Gates, sway_m};
+use super::adjust::{Adjustment, Gates};
 use super::mesh::Mesh;
 use super::posed::Posed;
 use super::sight::{Contact, Section};
@@ -18,8 +18,8 @@ pub struct Sections {
     pub covariance: DMatrix<f64>,
 }
 
-/// One section of one hold.
-struct Place {
+/// One section of one state.
+pub(super) struct Place {
     contact: Contact,
     chord: Vector3<f64>,
     point: Vector3<f64>,
@@ -36,19 +36,14 @@ impl Adjustment {
         let count = posed.len() * s_m.len();
         let mut values = Vec::with_capacity(count);
         let mut rows = DMatrix::zeros(self.layout.len(), 4 * count);
-        for hold in 0..posed.len() {
+        for (hold, blade) in posed.iter().enumerate() {
             for (i, s) in s_m.iter().enumerate() {
-                let (at, rest) = (self.place(&posed, hold, *s), self.place(&posed, 0, *s));
                 let first = 4 * (hold * s_m.len() + i);
-                for axis in 0..3 {
-                    let along = Vector3::ith(axis, 1.0);
-                    self.fill(&mut rows, first + axis, &posed, hold, &at, &along, &Vector3::zeros());
-                }
-                let (twist, slopes) = twist(&self.problem.mesh, &rest, &at);
-                for (which, place, slope) in [(0, &rest, slopes[0]), (hold, &at, slopes[1])] {
-                    self.fill(&mut rows, first + 3, &posed, which, place, &Vector3::zeros(), &slope);
-                }
-                values.push([at.point.x, at.point.y, at.point.z, twist]);
+                let at = self.place_at(blade, hold, *s, None);
+                let rest = self.place_at(&posed[0], 0, *s, None);
+                values.push(self.fill_state(&mut rows, first, blade, hold, &at, &rest));
+                let (_, slopes) = twist(&self.problem.mesh, &rest, &at);
+                self.fill(&mut rows, first + 3, (&posed[0], 0), &rest, &Vector3::zeros(), &slopes[0]);
             }
         }
         let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
@@ -56,9 +51,32 @@ impl Adjustment {
         Ok(Sections { values, covariance })
     }
 
-    fn place(&self, posed: &[Posed], hold: usize, s_m: f64) -> Place {
-        let (mesh, blade) = (&self.problem.mesh, &posed[hold]);
-        let section = blade.at_rest().section(mesh, s_m);
+    /// Position and twist of a section of a hold, with their slopes in four columns from `first`.
+    pub(super) fn fill_state(
+        &self,
+        rows: &mut DMatrix<f64>,
+        first: usize,
+        posed: &Posed,
+        hold: usize,
+        at: &Place,
+        rest: &Place,
+    ) -> [f64; 4] {
+        for axis in 0..3 {
+            let along = Vector3::ith(axis, 1.0);
+            self.fill(rows, first + axis, (posed, hold), at, &along, &Vector3::zeros());
+        }
+        let (twist, slopes) = twist(&self.problem.mesh, rest, at);
+        self.fill(rows, first + 3, (posed, hold), at, &Vector3::zeros(), &slopes[1]);
+        [at.point.x, at.point.y, at.point.z, twist]
+    }
+
+    /// A section of a hold at an instant, or averaged over the hold.
+    pub(super) fn place_at(&self, blade: &Posed, hold: usize, s_m: f64, time_ns: Option<i64>) -> Place {
+        let mesh = &self.problem.mesh;
+        let section = match time_ns {
+            None => blade.at_rest().section(mesh, s_m),
+            Some(time_ns) => blade.at(time_ns).section(mesh, s_m),
+        };
         let blend = |column: &[Vector3<f64>]| {
             column[section.node] * (1.0 - section.share) + column[section.node + 1] * section.share
         };
@@ -71,13 +89,20 @@ impl Adjustment {
             normal: Vector3::zeros(),
             section,
         };
+        let sway = match time_ns {
+            None => self.mean_sway(blade, hold),
+            Some(time_ns) => {
+                let (first, weights) = blade.beat(time_ns);
+                (0..4).map(|k| (first + k, weights[k])).collect()
+            }
+        };
         let mut place = Place {
             point: contact.point,
             chord: section.turn * blend(&mesh.chord).normalize(),
             contact,
-            sway: self.mean_sway(blade, hold),
+            sway,
         };
-        place.point += self.correction(posed, hold, &place);
+        place.point += self.correction((blade, hold), &place, time_ns.is_none());
         place
     }
 
@@ -94,39 +119,39 @@ impl Adjustment {
         weights.into_iter().enumerate().collect()
     }
 
-    /// What sway and surface unknowns add to the point of the drawing.
-    fn correction(&self, posed: &[Posed], hold: usize, place: &Place) -> Vector3<f64> {
+    /// What the surface unknowns add to the point of the drawing, and the sway where it is not in it.
+    fn correction(&self, of: (&Posed, usize), place: &Place, has_sway: bool) -> Vector3<f64> {
         let mut rows = DMatrix::zeros(self.layout.len(), 3);
         for axis in 0..3 {
             let along = Vector3::ith(axis, 1.0);
-            self.fill(&mut rows, axis, posed, hold, place, &along, &Vector3::zeros());
+            self.fill(&mut rows, axis, of, place, &along, &Vector3::zeros());
         }
         let mut values = self.values.clone();
-        values.rows_mut(0, self.layout.sway_at(0)).fill(0.0);
+        let posed = if has_sway { self.layout.sway_at(0) } else { self.layout.lidar_at(0) };
+        values.rows_mut(0, posed).fill(0.0);
         Vector3::from_iterator(rows.tr_mul(&values).iter().copied())
     }
 
-    #[allow(clippy::too_many_arguments)] // one row of one place
+    /// Adds to a column how all unknowns move a place along `along` and turn it about `turn`.
     fn fill(
         &self,
         rows: &mut DMatrix<f64>,
         column: usize,
-        posed: &[Posed],
-        hold: usize,
+        (posed, hold): (&Posed, usize),
         place: &Place,
         along: &Vector3<f64>,
         turn: &Vector3<f64>,
     ) {
         let (layout, section) = (&self.layout, &place.contact.section);
         let about = (place.contact.point - section.place).cross(along) + turn;
-        let slopes = posed[hold].slopes(section, along, &about);
+        let slopes = posed.slopes(section, along, &about);
         for (unknown, slope) in self.state_at(hold).into_iter().zip(slopes) {
             rows[(unknown, column)] += slope;
         }
-        for (mode, slope) in posed[hold].sway_slopes(section, along, &about).enumerate() {
+        for (mode, slope) in posed.sway_slopes(section, along, &about).enumerate() {
             let first = layout.sway_at(hold) + mode * layout.knots[hold];
             for (knot, weight) in &place.sway {
-                rows[(first + knot, column)] += slope * weight * sway_m(mode);
+                rows[(first + knot, column)] += slope * weight * self.modes_m[mode];
             }
         }
         let mut shape = Vec::new();

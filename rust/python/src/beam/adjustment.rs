@@ -1,15 +1,18 @@
 //! The adjustment of all holds, step by step.
 
-use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem};
+use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem, Stage};
 use lidar_deflect_core::beam::family::{Loading, Trust};
 use lidar_deflect_core::beam::rig::Rig;
 use lidar_deflect_core::beam::rows::{Tally, Weights};
 use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
+use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
+use lidar_deflect_core::error::InvalidValue;
 use lidar_deflect_core::frame::WorldFromSensor;
 use nalgebra::{DMatrix, DVector, Vector3};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use rayon::prelude::*;
 
 use super::blade::BeamBlade;
 use super::seen::BeamSeen;
@@ -40,7 +43,7 @@ impl BeamAdjustment {
         seen: Vec<PyRef<'_, BeamSeen>>,
         spans_ns: Vec<(i64, i64)>,
         forces_n: PyReadonlyArray3<'_, f64>,
-        full_n: f64,
+        full_n: PyReadonlyArray2<'_, f64>,
         poses: PyReadonlyArray3<'_, f64>,
         channels: Vec<usize>,
         rig_prior: PyReadonlyArray1<'_, f64>,
@@ -66,7 +69,7 @@ impl BeamAdjustment {
                     .outer_iter()
                     .map(|f| Vector3::new(f[0], f[1], f[2]))
                     .collect(),
-                full_n,
+                full_n: full_n.as_array().outer_iter().map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt()).sum(),
             },
         };
         let [stiffness, weight, prebend, free_rad_m, root_rad] = trust;
@@ -90,6 +93,7 @@ impl BeamAdjustment {
                 root_rad,
             },
             shape: Shape::new(&blade.mesh, shape, from_m),
+            full_n: full_n.as_array().outer_iter().map(|f| Vector3::new(f[0], f[1], f[2])).collect(),
             holds: (0..seen.len()).map(hold).collect(),
         };
         let matrices = arrays::matrices("poses", &poses, channels.len())?;
@@ -119,9 +123,13 @@ impl BeamAdjustment {
     }
 
     /// One step with data inside of the gates; what became of them, by hold.
-    fn step<'py>(&mut self, py: Python<'py>, echo_m: f64, edge_m: f64, is_free: bool) -> BorderResult<Bound<'py, PyDict>> {
+    fn step<'py>(&mut self, py: Python<'py>, echo_m: f64, edge_m: f64, stage: &str) -> BorderResult<Bound<'py, PyDict>> {
         let core = &mut self.core;
-        let gates = Gates { echo_m, edge_m, is_free };
+        let gates = Gates {
+            echo_m,
+            edge_m,
+            stage: stage_named(stage)?,
+        };
         let step = compute(py, self.threads, || core.step(&gates))??;
         let told = PyDict::new(py);
         told.set_item("largest", step.largest)?;
@@ -139,7 +147,11 @@ impl BeamAdjustment {
         echo_m: f64,
         edge_m: f64,
     ) -> BorderResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
-        let gates = Gates { echo_m, edge_m, is_free: true };
+        let gates = Gates {
+            echo_m,
+            edge_m,
+            stage: Stage::All,
+        };
         let found = compute(py, self.threads, || self.core.sections(&s_m, &gates))??;
         let count = found.covariance.nrows();
         let values = found.values.as_flattened().to_vec();
@@ -148,6 +160,72 @@ impl BeamAdjustment {
             arrays::table(py, values, 4)?,
             arrays::table(py, covariance, count)?,
         ))
+    }
+
+    /// States of the sections within a hold at instants, (times * sections, 4), and their variances.
+    fn states<'py>(
+        &self,
+        py: Python<'py>,
+        hold: usize,
+        s_m: Vec<f64>,
+        times_ns: Vec<i64>,
+    ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
+        let at = |time: &i64| self.core.states_at(&self.core, hold, &s_m, *time).0;
+        let values: Vec<[f64; 4]> = compute(py, self.threads, || times_ns.iter().flat_map(at).collect())?;
+        Ok(arrays::rows(py, values)?)
+    }
+
+    /// Instants at which `follow` wants the load of a stretch of time.
+    #[staticmethod]
+    fn load_knots(span_ns: (i64, i64)) -> Vec<i64> {
+        load_knots(span_ns)
+    }
+
+    /// Follows stretches of time (what was seen, span, load at its knots, instants): per stretch the
+    /// states (times * sections, 4), their variances from noise, and what became of the data.
+    #[allow(clippy::type_complexity)] // the three that Python unpacks
+    fn follow<'py>(
+        &self,
+        py: Python<'py>,
+        seen: Vec<PyRef<'py, BeamSeen>>,
+        spans_ns: Vec<(i64, i64)>,
+        loads: Vec<Vec<f64>>,
+        times_ns: Vec<Vec<i64>>,
+        s_m: Vec<f64>,
+        hold_loads: Vec<f64>,
+        gates: Vec<(f64, f64)>,
+    ) -> BorderResult<Vec<Option<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyDict>)>>> {
+        let stretches: Vec<Stretch> = seen
+            .iter()
+            .zip(spans_ns.iter().zip(&loads))
+            .map(|(seen, (span, load))| Stretch {
+                seen: seen.seen.clone(),
+                span_ns: *span,
+                load: load.clone(),
+            })
+            .collect();
+        let gates: Vec<Gates> = gates
+            .iter()
+            .map(|(echo_m, edge_m)| Gates {
+                echo_m: *echo_m,
+                edge_m: *edge_m,
+                stage: Stage::All,
+            })
+            .collect();
+        let core = &self.core;
+        let follow = |(stretch, times): (&Stretch, &Vec<i64>)| {
+            let mut part = core.stretch(stretch, &hold_loads).ok()?;
+            part.follow(core, &s_m, times, &gates).ok()
+        };
+        let found: Vec<_> = compute(py, self.threads, || {
+            stretches.par_iter().zip(times_ns.par_iter()).map(follow).collect()
+        })?;
+        let hand = |followed: Option<Followed>| -> PyResult<_> {
+            let Some(f) = followed else { return Ok(None) };
+            let parts = (arrays::rows(py, f.values)?, arrays::rows(py, f.variances)?, tally(py, &f.tally)?);
+            Ok(Some(parts))
+        };
+        Ok(found.into_iter().map(hand).collect::<PyResult<Vec<_>>>()?)
     }
 
     /// All unknowns, in standard deviations; those of the lidars in their own units.
@@ -176,13 +254,34 @@ impl BeamAdjustment {
 
 fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
     let told = PyDict::new(py);
-    let (lidars, residuals): (Vec<usize>, Vec<f64>) = tally.residuals.iter().copied().unzip();
-    told.set_item("lidar", lidars)?;
-    told.set_item("residual_m", residuals.into_pyarray(py))?;
+    let used = &tally.used;
+    told.set_item("time_ns", column(py, used.iter().map(|u| u.time_ns)))?;
+    told.set_item("lidar", column(py, used.iter().map(|u| u.lidar as u32)))?;
+    told.set_item("ring", column(py, used.iter().map(|u| u.ring as u32)))?;
+    told.set_item("s_m", column(py, used.iter().map(|u| u.s_m)))?;
+    told.set_item("residual_m", column(py, used.iter().map(|u| u.residual_m)))?;
+    told.set_item("xyz_m", arrays::rows(py, used.iter().map(|u| u.point.into()).collect::<Vec<[f64; 3]>>())?)?;
     told.set_item("edges", tally.edges.clone())?;
     told.set_item("missed", tally.missed)?;
     told.set_item("rejected", tally.rejected)?;
     told.set_item("unfit", tally.unfit)?;
     told.set_item("edges_left_out", tally.edges_left_out)?;
     Ok(told)
+}
+
+fn column<T: numpy::Element>(py: Python<'_>, values: impl Iterator<Item = T>) -> Bound<'_, PyArray1<T>> {
+    values.collect::<Vec<T>>().into_pyarray(py)
+}
+
+fn stage_named(name: &str) -> Result<Stage, InvalidValue> {
+    match name {
+        "loads" => Ok(Stage::Loads),
+        "blade" => Ok(Stage::Blade),
+        "all" => Ok(Stage::All),
+        _ => Err(InvalidValue {
+            name: "stage",
+            expected: "loads, blade or all".into(),
+            found: name.into(),
+        }),
+    }
 }
