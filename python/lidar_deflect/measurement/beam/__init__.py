@@ -177,7 +177,9 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
             "hold": hold.label,
             "share": share,
             "echoes": len(told["residual_m"]),
-            "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2))) if len(told["residual_m"]) else None,
+            "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2)))
+            if len(told["residual_m"])
+            else None,
             "rejected": told["rejected"],
             "edges": len(told["edges"]),
             "edges_left_out": list(told["edges_left_out"]),

@@ -107,9 +107,7 @@ def over_time(
     )
 
 
-def _between(
-    shares: Floats, load: Floats
-) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+def _between(shares: Floats, load: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
     """Holds whose loads lie on both sides of each load, and the share of the way between them."""
     order = np.argsort(shares, kind="stable")
     sorted_shares = shares[order]
