@@ -185,6 +185,7 @@ def test_the_plan_shows_lidars_and_anchors_where_they_are_known() -> None:
 DRAWN = (
     "time_series",
     "wires",
+    "channels",
     "load_deflection",
     "creep",
     "deflected_shapes",

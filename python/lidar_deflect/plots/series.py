@@ -9,7 +9,7 @@ import polars as pl
 from lidar_deflect import wires as virtual
 from lidar_deflect.channels import from_table
 from lidar_deflect.plots import style
-from lidar_deflect.plots.source import HasTables, section_of, table
+from lidar_deflect.plots.source import HasTables, configuration, section_of, table
 
 Quantity = Literal["deflection", "position"]
 
@@ -250,4 +250,48 @@ def _wire_line(part: pl.DataFrame, label: str, k: int, *, first: bool) -> go.Sca
         showlegend=first,
         connectgaps=False,
         hovertemplate="%{x:.2f} s<br>%{y:.4f} m<extra>" + label + "</extra>",
+    )
+
+
+def other_names(result: HasTables) -> list[str]:
+    """Name the channels that are neither load nor wire: root, strain, inclinometers."""
+    channels = table(result, "channels")
+    wired = set(wire_names(channels))
+    names = channels["channel"].unique(maintain_order=True).to_list()
+    drawn = {"load", *wired, *(name + virtual.SUFFIX for name in wired)}
+    config = configuration(result)
+    drawn |= {str(wire.get("name")) for wire in config.get("wires") or ()}
+    return [name for name in names if name not in drawn]
+
+
+def channels(result: HasTables) -> go.Figure:
+    """Draw every other channel, one panel per unit."""
+    frame = table(result, "channels")
+    names = other_names(result)
+    shown = frame.filter(pl.col("channel").is_in(names))
+    units = shown["unit"].unique(maintain_order=True).to_list()
+    figure = style.panels(max(len(units), 1), shared_xaxes=True)
+    if not names:
+        return style.note(figure, "no other channel was read")
+    for row, unit in enumerate(units, start=1):
+        own = shown.filter(pl.col("unit") == unit)
+        for name in own["channel"].unique(maintain_order=True):
+            part = own.filter(pl.col("channel") == name).sort("time")
+            figure.add_trace(_channel_line(part, name, names.index(name)), row=row, col=1)
+        figure.update_yaxes(title_text=f"reading ({style.text(unit)})", row=row, col=1)
+    figure.update_xaxes(title_text="time (s)", row=len(units), col=1)
+    figure.update_layout(height=160 + 180 * len(units))
+    return figure
+
+
+def _channel_line(part: pl.DataFrame, name: str, k: int) -> go.Scatter:
+    part = style.thinned(part, ["value"], MOST_STATES)
+    return go.Scatter(
+        x=part["t_s"],
+        y=part["value"],
+        mode="lines",
+        name=style.text(name),
+        line={"color": style.colour(k), "dash": style.dash(k), "width": 1.5},
+        connectgaps=False,
+        hovertemplate="%{x:.2f} s<br>%{y:.5g}<extra>%{fullData.name}</extra>",
     )

@@ -152,6 +152,7 @@ CAPTIONS = {
         "turn as well. Dots are echoes, the thick line is the blade, the thin one its unloaded "
         "shape, rings are the sections, squares the lidars, crosses the winch ends of wires."
     ),
+    "channels": "Other instruments, on the clock of the lidars.",
     "wires": (
         "Draw wires: the reading, and what the wire would have read at the positions that the "
         "lidars measured. Where only the second stands, the wire is virtual. Below, the "
