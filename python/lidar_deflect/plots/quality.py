@@ -1,5 +1,7 @@
 """Figures of how well it went: errors by method (the paper's figure 20), health of the lidars."""
 
+from typing import Any
+
 import plotly.graph_objects as go
 import polars as pl
 
@@ -26,7 +28,7 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
                 y=rows["error_percent"],
                 name=style.text(name),
                 marker={"color": style.colour(k), "pattern": {"shape": ["", "/", ".", "x"][k % 4]}},
-                error_y={"type": "data", "array": rows["interval_percent"].fill_null(0.0)},
+                error_y=_intervals(rows["interval_percent"]),
                 text=[f"{value:z.2f}" for value in rows["error_percent"]],
                 textposition="outside",
                 cliponaxis=False,
@@ -41,6 +43,13 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
     figure.update_yaxes(title_text="error (%)")
     figure.update_layout(barmode="group", height=440)
     return figure
+
+
+def _intervals(half: pl.Series) -> dict[str, Any] | None:
+    """Error bars, none where no method states an uncertainty."""
+    if half.null_count() == len(half):
+        return None
+    return {"type": "data", "array": half.fill_null(0.0)}
 
 
 def _bars(frame: pl.DataFrame, step: str | None) -> pl.DataFrame:
