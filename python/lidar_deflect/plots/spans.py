@@ -4,14 +4,15 @@ import numpy as np
 import plotly.graph_objects as go
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.plots import style
 from lidar_deflect.plots.shapes import line_of
 from lidar_deflect.plots.source import HasTables, table
 
 _PANELS = (
-    ("rx_rad", "about x (°)", 180.0 / np.pi),
-    ("ry_rad", "about y (°)", 180.0 / np.pi),
-    ("twist_deg", "twist (°)", 1.0),
+    ("rx_rad", words.PLOT["about_x"], 180.0 / np.pi),
+    ("ry_rad", words.PLOT["about_y"], 180.0 / np.pi),
+    ("twist_deg", words.PLOT["twist"], 1.0),
 )
 
 
@@ -25,7 +26,7 @@ def rotation(result: HasTables) -> go.Figure:
     """Draw the rotation of the sections about x and y and their twist change along the span."""
     figure = style.panels(3, shared_xaxes=True)
     if not has_rotations(result):
-        return style.note(figure, "this method gives no rotations along the span")
+        return style.note(figure, words.PLOT["this_method_gives_no_rotations_alo"])
     contour = table(result, "contour")
     for k, step in enumerate(result.steps["step"].unique(maintain_order=True)):
         rows = result.steps.filter(pl.col("step") == step)
@@ -34,7 +35,7 @@ def rotation(result: HasTables) -> go.Figure:
             _add_step(figure, line, rows, step, k)
     for row, (_, label, _) in enumerate(_PANELS, start=1):
         figure.update_yaxes(title_text=label, row=row, col=1)
-    figure.update_xaxes(title_text="arc length s (m)", row=3, col=1)
+    figure.update_xaxes(title_text=words.PLOT["arc_length_s"], row=3, col=1)
     figure.update_layout(height=620)
     return figure
 
