@@ -19,11 +19,12 @@ use lidar_deflect_core::paper::tip::{Plane, TipLimits};
 use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport};
 use lidar_deflect_core::synthetic::blade::{BuildErrors, Orientation};
 use lidar_deflect_core::synthetic::echo::Optics;
-use lidar_deflect_core::synthetic::lidar::{Clock, LidarPlan, MODELS};
+use lidar_deflect_core::synthetic::lidar::{Clock, LidarPlan};
 use lidar_deflect_core::synthetic::motion::Schedule;
 use lidar_deflect_core::synthetic::network::NetworkPlan;
 use lidar_deflect_core::synthetic::plan::{SaddlePlan, axes};
 use lidar_deflect_core::synthetic::reference::Stations;
+use lidar_deflect_core::synthetic::sensor::Sensor;
 use lidar_deflect_core::synthetic::terrain::GroundPlan;
 use lidar_deflect_core::synthetic::{ScenePlan, Simulation};
 use lidar_deflect_core::time::Timestamp;
@@ -37,7 +38,9 @@ const PLACES_M: [f64; 4] = [86.0, 94.0, 102.0, 109.5];
 
 fn lidar(index: u8, z_m: f64) -> LidarPlan {
     LidarPlan {
-        model: &MODELS[0],
+        sensor: std::sync::Arc::new(Sensor::new("vlp16").unwrap()),
+        kick: None,
+        silent_s: Vec::new(),
         address: [192, 168, 1, 201 + index],
         port: 2368,
         position_m: Vector3::new(3.0, -7.0, z_m),
@@ -89,9 +92,11 @@ fn scene() -> ScenePlan {
             slope: [0.01, 0.0],
             roughness_m: 0.01,
             correlation_m: 0.8,
+            swell_m: 0.0,
         },
         wall: None,
         boxes: Vec::new(),
+        targets: Vec::new(),
         lidars: (0..)
             .zip(PLACES_M)
             .map(|(index, z_m)| lidar(index, z_m))
@@ -105,6 +110,9 @@ fn scene() -> ScenePlan {
             max_range_m: 100.0,
             grazing_rad: 1.5,
             incidence_bias_m: 0.0,
+            faint_bias_m: 0.0,
+            retro_bias_m: 0.0,
+            noise_freedom: 0,
         },
         network: NetworkPlan {
             loss: 0.004,

@@ -407,7 +407,7 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     named = {source: model for source, model in named.items() if model != "auto"}
     known = dict(sensor_models())
     for model in (named | dict(sensors or {})).values():
-        if model not in known:
+        if _native.sensor_id(model) is None:
             raise InvalidValueError(
                 f"sensor model: expected one of {', '.join(known)}, found {model!r}",
                 code="sensor.unknown",

@@ -13,3 +13,4 @@ pub mod rs;
 pub mod ruby;
 pub mod solid;
 pub mod table;
+pub mod writer;

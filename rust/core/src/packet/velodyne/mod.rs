@@ -8,10 +8,11 @@ pub mod hdl64e;
 mod lanes;
 pub mod position;
 pub mod puck;
-mod rotation;
+pub(super) mod rotation;
 mod rows;
 pub mod vlp32;
 pub mod vls128;
+pub mod writer;
 
 use crate::packet::echoes::RawEcho;
 use crate::packet::{Misfit, ReturnMode};
