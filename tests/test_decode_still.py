@@ -87,7 +87,7 @@ def test_a_mid360_is_found_decoded_and_its_losses_counted(tmp_path: Path) -> Non
     kept = [one for one in sent if one not in [data[number] for number in lost]]
     opened = capture.open(write_pcap(tmp_path / "a.pcap", kept))
     (stream,) = opened.streams
-    assert (stream.model, stream.candidates, stream.rpm) == ("mid-360", (), None)
+    assert (stream.model, stream.candidates, stream.rpm) == ("mid360", (), None)
     assert (stream.packets, stream.lost) == (len(data) - 6, 6)
     assert (stream.foreign, stream.clock_kind) == (0, "utc")
     found = columns(opened)
@@ -109,7 +109,7 @@ def test_a_mid360_is_found_decoded_and_its_losses_counted(tmp_path: Path) -> Non
 def test_both_returns_of_an_avia_and_its_clocks(tmp_path: Path, sync: int) -> None:
     opened = capture.open(write_pcap(tmp_path / "a.pcap", avia(2.5, sync)))
     (stream,) = opened.streams
-    assert (stream.model, set(stream.candidates)) == ("avia", {"horizon", "tele-15"})
+    assert (stream.model, set(stream.candidates)) == ("avia", {"horizon", "tele15"})
     assert stream.return_mode == "dual (first, second)"
     assert (stream.lost, stream.clock["jumps"], stream.clock_kind) == (0, 0, "utc")
     found = columns(opened)
@@ -141,8 +141,8 @@ def test_info_shows_no_turns_of_a_sensor_without_a_rotor(
     path = write_pcap(tmp_path / "a.pcap", [*mid360(0.2), *e1(0.2, 0)])
     assert run(["info", str(path), "--json"]) == 0
     streams = json.loads(capsys.readouterr().out)["streams"]
-    assert [(one["model"], one["rpm"]) for one in streams] == [("mid-360", None), ("rs-e1", None)]
+    assert [(one["model"], one["rpm"]) for one in streams] == [("mid360", None), ("rs-e1", None)]
     assert run(["info", str(path)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    (row,) = [line.split() for line in lines if line.split()[2:3] == ["mid-360"]]
-    assert row[2:5] == ["mid-360", "single", "-"]
+    (row,) = [line.split() for line in lines if line.split()[2:3] == ["mid360"]]
+    assert row[2:5] == ["mid360", "single", "-"]

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "BeamAdjustment",
+    "BeamBlade",
+    "BeamSeen",
     "CaptureScan",
     "ContourCurves",
     "ContourPass",
@@ -21,6 +24,7 @@ __all__ = [
     "SweepIterator",
     "__version__",
     "arc_length",
+    "beam_seen",
     "check_captures",
     "curve_distances",
     "curve_points",
@@ -45,6 +49,7 @@ __all__ = [
     "rotation_onto",
     "scan_capture",
     "scan_quickly",
+    "sensor_id",
     "sensor_models",
     "sensor_table",
     "simulated_sensors",
@@ -78,6 +83,7 @@ def scan_quickly(
     units: Sequence[tuple[str | None, str, bytes, bool]],
     head_s: float,
 ) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
+def sensor_id(name: str) -> str | None: ...
 def sensor_models() -> list[tuple[str, str]]: ...
 def sensor_table() -> list[list[str]]: ...
 
@@ -364,3 +370,82 @@ class ContourCurves:
     def tip(self, plane: str, max_u_m: float) -> tuple[float, float]: ...
     def length_m(self, from_z_m: float, to_z_m: float) -> float: ...
     def before_m(self, tip_z_m: float, length_m: float) -> list[float]: ...
+
+@final
+class BeamBlade:
+    def __new__(
+        cls,
+        stations: NDArray[np.float64],
+        outline_s_m: Sequence[float],
+        outlines: NDArray[np.float64],
+        *,
+        leading_edge: NDArray[np.float64],
+        suction_side: NDArray[np.float64],
+        saddles_s_m: Sequence[float],
+    ) -> BeamBlade: ...
+    def forces_for(
+        self,
+        direction: NDArray[np.float64],
+        s_m: Sequence[float],
+        deflection_m: Sequence[float],
+    ) -> NDArray[np.float64] | None: ...
+
+@final
+class BeamSeen:
+    def __len__(self) -> int: ...
+
+def beam_seen(
+    scan: CaptureScan,
+    *,
+    lidars: Sequence[int],
+    poses: NDArray[np.float64],
+    cut_azimuth_deg: Sequence[float],
+    box_m: NDArray[np.float64],
+    windows_ns: Sequence[tuple[int, int]],
+    progress: Callable[[int, int], None] | None = None,
+) -> list[BeamSeen]: ...
+@final
+class BeamAdjustment:
+    def __new__(
+        cls,
+        blade: BeamBlade,
+        seen: Sequence[BeamSeen],
+        *,
+        spans_ns: Sequence[tuple[int, int]],
+        forces_n: NDArray[np.float64],
+        full_n: NDArray[np.float64],
+        poses: NDArray[np.float64],
+        channels: Sequence[int],
+        rig_prior: NDArray[np.float64],
+        rig_covariance: NDArray[np.float64],
+        from_m: float,
+        trust: Sequence[float],
+        shape_trust: Sequence[float],
+        noise_m: float,
+        surface_m: float,
+        edge_rad: float,
+        echoes: int,
+        threads: int | None = None,
+    ) -> BeamAdjustment: ...
+    def linearise(self) -> None: ...
+    def step(self, echo_m: float, edge_m: float, stage: str) -> dict[str, Any]: ...
+    def sections(
+        self, s_m: Sequence[float], echo_m: float, edge_m: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def states(
+        self, hold: int, s_m: Sequence[float], times_ns: Sequence[int]
+    ) -> NDArray[np.float64]: ...
+    @staticmethod
+    def load_knots(span_ns: tuple[int, int]) -> list[int]: ...
+    def follow(
+        self,
+        seen: Sequence[BeamSeen],
+        spans_ns: Sequence[tuple[int, int]],
+        loads: Sequence[Sequence[float]],
+        times_ns: Sequence[Sequence[int]],
+        s_m: Sequence[float],
+        hold_loads: Sequence[float],
+        gates: Sequence[tuple[float, float]],
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]] | None]: ...
+    def values(self) -> NDArray[np.float64]: ...
+    def layout(self) -> dict[str, int]: ...

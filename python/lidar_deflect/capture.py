@@ -1,6 +1,5 @@
 """Captures: open them, tell what they hold, iterate over the sweeps of their lidars."""
 
-import html
 import math
 import shutil
 import tempfile
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from lidar_deflect import _native, bags, units
 from lidar_deflect._native import Sweep, SweepIterator
 from lidar_deflect.errors import CaptureError, InvalidValueError
+from lidar_deflect.notebook import card
 from lidar_deflect.streams import StreamInfo, no_lidar, same_address, stream, utc
 
 __all__ = ["RETURN_KINDS", "Capture", "StreamInfo", "Sweep", "Sweeps", "open", "sensor_models"]
@@ -351,10 +351,7 @@ class Capture:
             )
             for s in self.streams
         ]
-        head = "".join(f"<th>{name}</th>" for name in header)
-        cells = ("".join(f"<td>{html.escape(str(cell))}</td>" for cell in row) for row in rows)
-        body = "".join(f"<tr>{row}</tr>" for row in cells)
-        return f"<p>{html.escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
+        return card(repr(self), header, rows)
 
 
 def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
@@ -410,7 +407,7 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     named = {source: model for source, model in named.items() if model != "auto"}
     known = dict(sensor_models())
     for model in (named | dict(sensors or {})).values():
-        if model not in known:
+        if _native.sensor_id(model) is None:
             raise InvalidValueError(
                 f"sensor model: expected one of {', '.join(known)}, found {model!r}",
                 code="sensor.unknown",

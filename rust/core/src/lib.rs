@@ -25,6 +25,7 @@ pub mod neighbors;
 pub mod cluster;
 pub mod register;
 
+pub mod beam;
 pub mod blade;
 pub mod paper;
 

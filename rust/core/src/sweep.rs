@@ -66,6 +66,7 @@ pub struct SweepCutter {
     visible_rad: f64,
     open: Option<Open>,
     spare: Vec<PointCloud<Sensor>>,
+    usual: usize, // echoes of the last sweep: as much room is made for the next
 }
 
 /// The sweep that is being filled.
@@ -89,6 +90,7 @@ impl SweepCutter {
             visible_rad: visible_rad.clamp(1e-3, TAU),
             open: None,
             spare: Vec::new(),
+            usual: 0,
         }
     }
 
@@ -168,7 +170,8 @@ impl SweepCutter {
     }
 
     fn open(&mut self, turn: u32, start: Timestamp) {
-        let cloud = self.spare.pop().unwrap_or_default();
+        let mut cloud = self.spare.pop().unwrap_or_default();
+        cloud.reserve(self.usual + self.usual / 16);
         self.open = Some(Open {
             turn,
             cloud,
@@ -182,6 +185,7 @@ impl SweepCutter {
 
     fn close(&mut self, end: Timestamp, out: &mut VecDeque<Sweep>) {
         let Some(open) = self.open.take() else { return };
+        self.usual = open.cloud.len();
         out.push_back(Sweep {
             lidar: self.lidar,
             index: open.turn,

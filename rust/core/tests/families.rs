@@ -30,7 +30,7 @@ fn decode(writer: &Writer, payload: &[u8], out: &mut Decoded) {
 /// Metres of one unit of range.
 fn unit_m(id: &str) -> f64 {
     match id {
-        "vlp16" | "vlp16-hires" | "hdl32e" | "hdl64e-s2" | "hdl64e-s3" => 0.002,
+        "vlp16" | "vlp16-hires" | "hdl32e" | "hdl64e-s2" | "hdl64e" => 0.002,
         "xt32m2x" => 0.005,
         _ => 0.004,
     }

@@ -375,7 +375,7 @@ fn every_model_is_named_from_its_packets_alone_and_has_no_rotor() {
 #[test]
 fn what_the_packets_cannot_tell_are_candidates() {
     let of = |id: &str| model(id).unwrap().candidates();
-    assert_eq!(of("avia"), ["horizon", "tele-15"]);
+    assert_eq!(of("avia"), ["horizon", "tele15"]);
     assert_eq!(of("rs-m1"), ["rs-m1-plus"]);
 }
 
@@ -460,7 +460,7 @@ fn frames_are_those_of_the_sensor_or_a_tenth_of_a_second() {
 fn stray_packets_and_companions_are_counted() {
     let writer = writers()
         .into_iter()
-        .find(|w| w.model.id() == "mid-360")
+        .find(|w| w.model.id() == "mid360")
         .unwrap();
     let setting = &writer.settings[0];
     let mut inertial = [0_u8; 60];
@@ -493,7 +493,7 @@ fn stray_packets_and_companions_are_counted() {
 fn tags_and_clocks_are_told_in_notes() {
     let writer = writers()
         .into_iter()
-        .find(|w| w.model.id() == "mid-360")
+        .find(|w| w.model.id() == "mid360")
         .unwrap();
     let report = scan(&writer, &writer.settings[0], &(0..100).collect::<Vec<_>>());
     let notes = report.lidars[0].notes.join("; ");

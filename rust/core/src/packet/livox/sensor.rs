@@ -97,14 +97,14 @@ const fn second(id: &'static str, title: &'static str, step: Step, lines: u16) -
 }
 
 /// Mid-40; one head of a Mid-100 is one.
-pub static MID_40: Livox = first("mid-40", "Livox Mid-40", &[], &[0, 1], SLOW, 1);
+pub static MID_40: Livox = first("mid40", "Livox Mid-40", &[], &[0, 1], SLOW, 1);
 /// Mid-70.
-pub static MID_70: Livox = first("mid-70", "Livox Mid-70", &[], TAGGED, SLOW, 1);
+pub static MID_70: Livox = first("mid70", "Livox Mid-70", &[], TAGGED, SLOW, 1);
 /// Avia.
 pub static AVIA: Livox = first(
     "avia",
     "Livox Avia",
-    &["horizon", "tele-15"],
+    &["horizon", "tele15"],
     TAGGED,
     FAST,
     6,
@@ -115,7 +115,7 @@ pub static HORIZON: Livox = Livox {
     ..first(
         "horizon",
         "Livox Horizon",
-        &["avia", "tele-15"],
+        &["avia", "tele15"],
         TAGGED,
         FAST,
         6,
@@ -125,7 +125,7 @@ pub static HORIZON: Livox = Livox {
 pub static TELE_15: Livox = Livox {
     is_told: false,
     ..first(
-        "tele-15",
+        "tele15",
         "Livox Tele-15",
         &["avia", "horizon"],
         TAGGED,
@@ -134,7 +134,7 @@ pub static TELE_15: Livox = Livox {
     )
 };
 /// Mid-360: 200 000 shots a second.
-pub static MID_360: Livox = second("mid-360", "Livox Mid-360", Step::new(5_000, 1), 4);
+pub static MID_360: Livox = second("mid360", "Livox Mid-360", Step::new(5_000, 1), 4);
 /// HAP: 452 000 shots a second.
 pub static HAP: Livox = second("hap", "Livox HAP", Step::new(250_000, 113), 6);
 

@@ -112,7 +112,7 @@ impl Unit {
 
 impl Model for Unit {
     fn id(&self) -> &'static str {
-        self.metadata.line()
+        self.metadata.id()
     }
 
     fn title(&self) -> &'static str {

@@ -77,6 +77,11 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
         true
     }
 
+    /// What the packets of a stream leave open although this model is taken.
+    fn doubt(&self, _packets: &[&[u8]]) -> Option<String> {
+        None
+    }
+
     /// Bytes by which the header names the model, by place.
     fn header(&self) -> Vec<(usize, u8)> {
         Vec::new()
@@ -222,6 +227,10 @@ impl<F: Family> Model for Rotating<F> {
         self.0.suits(packets)
     }
 
+    fn doubt(&self, packets: &[&[u8]]) -> Option<String> {
+        self.0.doubt(packets)
+    }
+
     fn fits(&self, payload: &[u8]) -> bool {
         self.view(payload).is_some()
     }
@@ -302,6 +311,11 @@ impl<F: Family> Model for Rotating<F> {
             "serial number {serial}, set to {rpm} rpm, clock source: {clock}"
         )];
         notes.extend(blank.then(|| "the unit describes itself without angles".into()));
+        let (told, own) = (difop.lasers(), self.0.lasers());
+        let is_more = own < 32 && told > own;
+        notes.extend(is_more.then(|| {
+            format!("the unit describes {told} lasers, of which the first {own} are taken")
+        }));
         UnitFacts {
             return_mode: self.0.mode(difop.return_mode()).map(ReturnMode::name),
             notes,

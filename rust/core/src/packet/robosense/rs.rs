@@ -36,8 +36,8 @@ pub static RS_32: Rotating<Rs> = Rotating(Rs::ThirtyTwo);
 impl Family for Rs {
     fn id(&self) -> &'static str {
         match self {
-            Self::Sixteen => "rs-16",
-            Self::ThirtyTwo => "rs-32",
+            Self::Sixteen => "rs16",
+            Self::ThirtyTwo => "rs32",
         }
     }
 

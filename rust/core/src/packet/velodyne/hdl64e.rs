@@ -44,7 +44,7 @@ pub static HDL64E_S2: Hdl64e = Hdl64e {
 
 /// The HDL-64E S3.
 pub static HDL64E_S3: Hdl64e = Hdl64e {
-    id: "hdl64e-s3",
+    id: "hdl64e",
     title: "Velodyne HDL-64E S3",
     row_ns: 57_600,
     four_ns: 7_200,

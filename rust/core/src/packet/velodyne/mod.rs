@@ -8,7 +8,7 @@ pub mod hdl64e;
 mod lanes;
 pub mod position;
 pub mod puck;
-mod rotation;
+pub(super) mod rotation;
 mod rows;
 pub mod vlp32;
 pub mod vls128;
