@@ -52,7 +52,7 @@ def measure(inputs: Inputs) -> States:
     s_m = np.array([*sections, *stations])
     followed = follow(inputs, expected, solved, s_m, times_ns)
     covariance = HoldCovariance.of(solved, s_m, LAST)
-    reference = covariance.values[0, :, :3]
+    reference = _reference(inputs, followed, times_ns, covariance)
     moved = followed.values[..., :3] - reference
     uncertainty = over_time(covariance, solved, expected, followed, times_ns, moved)
     of = slice(0, len(sections))
@@ -90,6 +90,20 @@ def moments(inputs: Inputs) -> NDArray[np.int64]:
     first = inputs.start_ns // period_ns + 1
     last = inputs.stop_ns // period_ns
     return np.arange(first, last + 1, dtype=np.int64) * period_ns
+
+
+def _reference(
+    inputs: Inputs, followed: Followed, times_ns: NDArray[np.int64], covariance: HoldCovariance
+) -> Floats:
+    """Unloaded position of every section, shape (s, 3): the mean of the unloaded hold's states."""
+    if inputs.unloaded_ns is None:
+        return np.asarray(covariance.values[0, :, :3])
+    inside = (times_ns >= inputs.unloaded_ns[0]) & (times_ns <= inputs.unloaded_ns[1])
+    states = followed.values[inside, :, :3]
+    known = ~np.isnan(states).any(axis=(1, 2))
+    if not known.any():
+        return np.asarray(covariance.values[0, :, :3])
+    return np.asarray(states[known].mean(axis=0))
 
 
 def _stations(inputs: Inputs) -> list[float]:

@@ -36,7 +36,7 @@ ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
 
 LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
-BLADE = ((1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
+BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
 ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
 """Gates of echoes along and of edges across the ray, metres, while the blade is being found."""
 LAST = (0.05, 0.05)
