@@ -37,6 +37,10 @@ class Wire(Model):
     negate: Flag = Field(
         default=False, description="true where the reading grows with the distance"
     )
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
+    )
 
     @model_validator(mode="after")
     def _has_column(self) -> Self:
@@ -54,6 +58,10 @@ class Root(Model):
     ry: Column | None = Field(default=None, description="column of the rotation about y, in mrad")
     rz: Column | None = Field(default=None, description="column of the rotation about z, in mrad")
     u_mrad: Positive = Field(default=0.05, description="standard uncertainty of each rotation")
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
+    )
 
     @model_validator(mode="after")
     def _has_a_rotation(self) -> Self:
@@ -84,8 +92,15 @@ class Load(Model):
     file: FilePath | None = Field(default=None, description="channel file; steps come from it")
     time: Column = Field(default="time_utc_s", description="column of the time, UTC")
     value: Column | None = Field(default=None, description="column of the load")
-    unit: Literal["percent", "fraction"] = Field(
-        default="percent", description="percent | fraction"
+    unit: Literal["percent", "fraction", "N", "kN", "MN", "Nm", "kNm", "MNm", "t", "bar", "V"] = (
+        Field(
+            default="percent",
+            description="percent | fraction, or N kN MN Nm kNm MNm t bar V (highest hold: 100 %)",
+        )
+    )
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
     )
     direction: Direction | None = Field(
         default=None, description="world axis or vector; default: of the largest deflection"

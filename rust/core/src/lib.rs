@@ -10,6 +10,7 @@ pub mod time;
 
 pub mod cloud;
 pub mod frame;
+mod simd;
 
 pub mod capture;
 pub mod clock;

@@ -177,8 +177,10 @@ impl Adjustment {
     /// [`BeamError::Unsettled`] where a load has no equilibrium.
     pub fn linearise(&mut self) -> Result<(), BeamError> {
         let holds = 0..self.problem.holds.len();
-        let all: Option<Vec<Linear>> =
-            holds.into_par_iter().map(|hold| self.linear_of(hold)).collect();
+        let all: Option<Vec<Linear>> = holds
+            .into_par_iter()
+            .map(|hold| self.linear_of(hold))
+            .collect();
         self.linear = all.ok_or(BeamError::Unsettled)?;
         Ok(())
     }
@@ -195,7 +197,10 @@ impl Adjustment {
         responses.extend(self.own_responses(hold, &physics, &at, &responses)?);
         let mut sway = family::sway_responses(mesh, &at);
         if self.follows_load {
-            let load = Unknown { kind: Kind::Load, sigma: 1.0 };
+            let load = Unknown {
+                kind: Kind::Load,
+                sigma: 1.0,
+            };
             sway.insert(0, family::responses(mesh, &physics, &at, &[load])?.pop()?);
         }
         Some(Linear {
@@ -207,7 +212,13 @@ impl Adjustment {
     }
 
     /// Responses of a hold's own unknowns; those of the stiffness are the shared ones scaled.
-    fn own_responses(&self, hold: usize, physics: &Physics, at: &Axis, shared: &[Response]) -> Option<Vec<Response>> {
+    fn own_responses(
+        &self,
+        hold: usize,
+        physics: &Physics,
+        at: &Axis,
+        shared: &[Response],
+    ) -> Option<Vec<Response>> {
         let respond = |unknown: &Unknown| {
             let same = self.shared.iter().position(|s| s.kind == unknown.kind);
             if let Some(place) = same.filter(|_| matches!(unknown.kind, Kind::Soft { .. })) {
@@ -223,14 +234,23 @@ impl Adjustment {
     pub(super) fn physics(&self, hold: usize) -> Physics {
         let problem = &self.problem;
         let mut physics = Physics::unloaded(&problem.mesh, &problem.saddles);
-        for (place, force) in physics.forces.iter_mut().zip(&problem.holds[hold].loading.force_n) {
+        for (place, force) in physics
+            .forces
+            .iter_mut()
+            .zip(&problem.holds[hold].loading.force_n)
+        {
             place.1 += force;
         }
         physics.full.clone_from(&problem.full_n);
         let state = self.state(hold);
         let unknowns = self.shared.iter().chain(&self.own[hold]);
         for (unknown, value) in unknowns.zip(state.iter()) {
-            family::add(&mut physics, &problem.mesh, unknown.kind, unknown.sigma * value);
+            family::add(
+                &mut physics,
+                &problem.mesh,
+                unknown.kind,
+                unknown.sigma * value,
+            );
         }
         physics
     }
@@ -260,7 +280,9 @@ impl Adjustment {
 
     /// Shared and own unknowns of a hold.
     fn state(&self, hold: usize) -> DVector<f64> {
-        let own = self.values.rows(self.layout.own_at(hold), self.layout.own[hold]);
+        let own = self
+            .values
+            .rows(self.layout.own_at(hold), self.layout.own[hold]);
         let shared = self.values.rows(0, self.layout.shared);
         let both = shared.iter().chain(own.iter()).copied();
         DVector::from_iterator(self.layout.shared + self.layout.own[hold], both)
@@ -269,7 +291,9 @@ impl Adjustment {
     /// Numbers of the unknowns of a hold's state, in the order of its responses.
     pub fn state_at(&self, hold: usize) -> Vec<usize> {
         let own = self.layout.own_at(hold);
-        (0..self.layout.shared).chain(own..own + self.layout.own[hold]).collect()
+        (0..self.layout.shared)
+            .chain(own..own + self.layout.own[hold])
+            .collect()
     }
 
     /// The blade of a hold as estimated so far.
@@ -292,7 +316,15 @@ impl Adjustment {
             .map(|k| self.values[at + k] * self.modes_m[k / self.layout.knots[hold]])
             .collect();
         let span = problem.holds[hold].span_ns;
-        Posed::new(&problem.mesh, still, &linear.responses, &linear.sway, &coefficients, span, self.knot_ns)
+        Posed::new(
+            &problem.mesh,
+            still,
+            &linear.responses,
+            &linear.sway,
+            &coefficients,
+            span,
+            self.knot_ns,
+        )
     }
 
     /// One step of Gauss and Newton with data inside of the gates.
@@ -303,7 +335,8 @@ impl Adjustment {
         let (normal, tallies) = self.normal(gates);
         let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
         let mut step = DVector::zeros(self.layout.len());
-        step.rows_mut(self.free.start, self.free.len()).copy_from(&part);
+        step.rows_mut(self.free.start, self.free.len())
+            .copy_from(&part);
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
         let largest = step.rows(0, self.layout.sway_at(0)).amax();
         if largest > LARGEST_STEP {
@@ -320,7 +353,9 @@ impl Adjustment {
 
     /// Normal equations at the present unknowns, with what became of the data.
     pub fn normal(&self, gates: &Gates) -> (Normal, Vec<Tally>) {
-        let lidars: Vec<Lidar> = (0..self.rig.poses.len()).map(|l| self.rig.lidar(l)).collect();
+        let lidars: Vec<Lidar> = (0..self.rig.poses.len())
+            .map(|l| self.rig.lidar(l))
+            .collect();
         let parts: Vec<(Normal, Tally)> = (0..self.problem.holds.len())
             .into_par_iter()
             .map(|hold| Rows::new(self, hold, &lidars, gates).collect())
@@ -342,7 +377,11 @@ impl Adjustment {
         let kind = if unknown < self.layout.shared {
             Some(self.shared[unknown].kind)
         } else {
-            self.own.iter().flatten().nth(unknown - self.layout.shared).map(|own| own.kind)
+            self.own
+                .iter()
+                .flatten()
+                .nth(unknown - self.layout.shared)
+                .map(|own| own.kind)
         };
         match kind {
             Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
@@ -365,7 +404,10 @@ impl Adjustment {
             let hold = if stage == Stage::All { 1.0 } else { HELD };
             let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
             let information = &self.rig.information * hold;
-            prior.matrix.view_mut((at, at), (count, count)).copy_from(&information);
+            prior
+                .matrix
+                .view_mut((at, at), (count, count))
+                .copy_from(&information);
             prior.right.rows_mut(at, count).copy_from(&(pull * hold));
         }
         prior

@@ -150,7 +150,10 @@ impl Design {
     /// Outline in chord lengths.
     pub fn contour(&self, s_m: f64) -> Vec<[f64; 2]> {
         let (index, share) = table::interval(&self.outlines.s_m, s_m);
-        let (a, b) = (&self.outlines.points[index], &self.outlines.points[index + 1]);
+        let (a, b) = (
+            &self.outlines.points[index],
+            &self.outlines.points[index + 1],
+        );
         let blend = |i: usize| [0, 1].map(|k| a[i][k] * (1.0 - share) + b[i][k] * share);
         (0..a.len()).map(blend).collect()
     }
@@ -174,7 +177,10 @@ fn check_stations(stations: &Stations) -> Result<(), InvalidValue> {
         if column.len() != rows || !column.iter().all(is_good) {
             return Err(InvalidValue {
                 name,
-                expected: format!("{rows} numbers{}", if is_positive { " above 0" } else { "" }),
+                expected: format!(
+                    "{rows} numbers{}",
+                    if is_positive { " above 0" } else { "" }
+                ),
                 found: format!("{} numbers", column.len()),
             });
         }
@@ -188,12 +194,18 @@ fn check_outlines(outlines: &Outlines) -> Result<(), InvalidValue> {
     let is_good = |outline: &Vec<[f64; 2]>| {
         outline.len() == count && outline.iter().flatten().all(|value| value.is_finite())
     };
-    if count < 4 || outlines.points.len() != outlines.s_m.len() || !outlines.points.iter().all(is_good)
+    if count < 4
+        || outlines.points.len() != outlines.s_m.len()
+        || !outlines.points.iter().all(is_good)
     {
         return Err(InvalidValue {
             name: "contours",
             expected: "outlines of one number of points, at least 4, at every station".into(),
-            found: format!("{} outlines at {} stations", outlines.points.len(), outlines.s_m.len()),
+            found: format!(
+                "{} outlines at {} stations",
+                outlines.points.len(),
+                outlines.s_m.len()
+            ),
         });
     }
     Ok(())

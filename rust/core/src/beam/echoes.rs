@@ -86,7 +86,11 @@ pub fn add_line(
         for (edge, reach_ns) in edges.into_iter().zip([2.0 * period_ns, -2.0 * period_ns]) {
             let beyond = edge.time_ns + reach_ns as i64;
             if !is_gap(edge.time_ns.min(beyond), edge.time_ns.max(beyond)) {
-                seen.edges.push(Edge { lidar, ring, ..edge });
+                seen.edges.push(Edge {
+                    lidar,
+                    ring,
+                    ..edge
+                });
             }
         }
     }
@@ -112,7 +116,9 @@ fn end(run: &[LineEcho], period_ns: f64, is_last: bool) -> Edge {
         false => run[from_end],
     };
     let (last, inner) = (at(0), at(TURN_ECHOES.min(run.len() - 1)));
-    let shots = ((last.time_ns - inner.time_ns).abs() as f64 / period_ns).round().max(1.0);
+    let shots = ((last.time_ns - inner.time_ns).abs() as f64 / period_ns)
+        .round()
+        .max(1.0);
     let (hit, before) = (last.xyz_m.normalize(), inner.xyz_m.normalize());
     Edge {
         time_ns: last.time_ns,

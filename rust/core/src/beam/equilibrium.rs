@@ -40,7 +40,10 @@ impl Physics {
     pub fn unloaded(mesh: &Mesh, saddles: &[usize]) -> Self {
         let elements = mesh.len() - 1;
         Self {
-            forces: saddles.iter().map(|node| (*node, Vector3::zeros())).collect(),
+            forces: saddles
+                .iter()
+                .map(|node| (*node, Vector3::zeros()))
+                .collect(),
             full: vec![Vector3::zeros(); saddles.len()],
             couples_nm: vec![0.0; saddles.len()],
             weight: vec![1.0; elements],
@@ -95,8 +98,10 @@ impl Physics {
             beyond.add(&axis.place[element + 1], &outer.0);
             beyond.torque += axis.turn[element + 1].column(2) * outer.1;
             let middle = 0.5 * (axis.place[element] + axis.place[element + 1]);
-            let weight_n =
-                mesh.mass_kg_m[element] * mesh.step_m(element) * GRAVITY_M_S2 * self.weight[element];
+            let weight_n = mesh.mass_kg_m[element]
+                * mesh.step_m(element)
+                * GRAVITY_M_S2
+                * self.weight[element];
             let half = Vector3::y() * (-0.5 * weight_n);
             // The outer half of the element's own weight acts beyond its middle.
             beyond.add(&(0.5 * (middle + axis.place[element + 1])), &half);

@@ -161,7 +161,10 @@ fn span_mode(mode: usize, x: f64) -> f64 {
 pub fn add(physics: &mut Physics, mesh: &Mesh, kind: Kind, value: f64) {
     let length = mesh.length_m();
     let wave = |element: usize, mode: usize| {
-        span_mode(mode, 0.5 * (mesh.s_m[element] + mesh.s_m[element + 1]) / length)
+        span_mode(
+            mode,
+            0.5 * (mesh.s_m[element] + mesh.s_m[element + 1]) / length,
+        )
     };
     let elements = 0..mesh.len() - 1;
     match kind {
@@ -217,7 +220,12 @@ pub fn responses(
             _ => Vector3::zeros(),
         };
         Some(Response {
-            curvature: ahead.curvature.iter().zip(&behind.curvature).map(slope).collect(),
+            curvature: ahead
+                .curvature
+                .iter()
+                .zip(&behind.curvature)
+                .map(slope)
+                .collect(),
             root_rad,
         })
     };
@@ -243,7 +251,11 @@ pub fn sway_responses(mesh: &Mesh, at: &Axis) -> Vec<Response> {
 }
 
 fn sway_shape(order: usize, x: f64) -> f64 {
-    if order == 1 { x * x } else { x * x * (4.0 * x - 3.0) }
+    if order == 1 {
+        x * x
+    } else {
+        x * x * (4.0 * x - 3.0)
+    }
 }
 
 fn sway_response(mesh: &Mesh, at: &Axis, order: usize, direction: &Vector3<f64>) -> Response {

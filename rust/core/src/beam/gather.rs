@@ -18,7 +18,11 @@ pub struct Gather {
 
 impl Gather {
     /// For lidars with these poses, points inside the box, and windows in time order.
-    pub fn new(poses: Vec<WorldFromSensor>, pass: PassThrough, windows_ns: Vec<(i64, i64)>) -> Self {
+    pub fn new(
+        poses: Vec<WorldFromSensor>,
+        pass: PassThrough,
+        windows_ns: Vec<(i64, i64)>,
+    ) -> Self {
         let seen = vec![Seen::default(); windows_ns.len()];
         Self {
             poses,
@@ -36,7 +40,10 @@ impl Gather {
             }
             for (ring, line) in lines(sweep, &self.poses[sweep.lidar], &self.pass, *window) {
                 let is_gap = |from: i64, to: i64| {
-                    sweep.gaps.iter().any(|gap| gap.from.0 <= to && from <= gap.to.0)
+                    sweep
+                        .gaps
+                        .iter()
+                        .any(|gap| gap.from.0 <= to && from <= gap.to.0)
                 };
                 let period_ns = shot_period_ns(&line);
                 add_line(seen, sweep.lidar, ring, &line, period_ns, is_gap);
@@ -58,7 +65,11 @@ fn lines(
     window_ns: (i64, i64),
 ) -> Vec<(usize, Vec<LineEcho>)> {
     let cloud = &sweep.cloud;
-    let rings = cloud.ring.iter().max().map_or(0, |last| usize::from(*last) + 1);
+    let rings = cloud
+        .ring
+        .iter()
+        .max()
+        .map_or(0, |last| usize::from(*last) + 1);
     let mut lines: Vec<Vec<LineEcho>> = vec![Vec::new(); rings];
     for (index, xyz) in cloud.xyz_m.iter().enumerate() {
         let time_ns = cloud.time_ns[index];
@@ -83,7 +94,10 @@ fn lines(
 /// Time from shot to shot of a beam: the median of the times between its echoes, which mostly follow
 /// each other.
 fn shot_period_ns(line: &[LineEcho]) -> f64 {
-    let mut steps: Vec<i64> = line.windows(2).map(|pair| pair[1].time_ns - pair[0].time_ns).collect();
+    let mut steps: Vec<i64> = line
+        .windows(2)
+        .map(|pair| pair[1].time_ns - pair[0].time_ns)
+        .collect();
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable(middle);
     (*median).max(1) as f64

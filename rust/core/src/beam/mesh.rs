@@ -45,11 +45,14 @@ impl Mesh {
     /// Cuts a blade, with nodes at the stations of the drawing and at `extra_m`.
     pub fn new(design: &Design, extra_m: &[f64]) -> Self {
         let s_m = nodes(design, extra_m);
-        let middles: Vec<f64> = s_m.windows(2).map(|ends| 0.5 * (ends[0] + ends[1])).collect();
+        let middles: Vec<f64> = s_m
+            .windows(2)
+            .map(|ends| 0.5 * (ends[0] + ends[1]))
+            .collect();
         let turn = |s: f64| -design.hand * design.lean(s).clamp(-0.9, 0.9).asin();
-        let free = s_m.windows(2).map(|ends| {
-            Vector3::x() * ((turn(ends[1]) - turn(ends[0])) / (ends[1] - ends[0]))
-        });
+        let free = s_m
+            .windows(2)
+            .map(|ends| Vector3::x() * ((turn(ends[1]) - turn(ends[0])) / (ends[1] - ends[0])));
         let lean = nalgebra::Rotation3::from_axis_angle(&Vector3::x_axis(), turn(0.0));
         Self {
             outline: s_m.iter().map(|s| design.outline(*s)).collect(),
@@ -102,7 +105,11 @@ fn nodes(design: &Design, extra_m: &[f64]) -> Vec<f64> {
     nodes.sort_by(f64::total_cmp);
     nodes.dedup_by(|a, b| (*a - *b).abs() < 0.02);
     let fill = |ends: &[f64]| -> Vec<f64> {
-        let spacing = if ends[0] < 0.5 * length { INNER_M } else { OUTER_M };
+        let spacing = if ends[0] < 0.5 * length {
+            INNER_M
+        } else {
+            OUTER_M
+        };
         let count = ((ends[1] - ends[0]) / spacing).ceil().max(1.0);
         let at = |i: usize| ends[0] + (ends[1] - ends[0]) * i as f64 / count;
         (0..count as usize).map(at).collect()
@@ -113,7 +120,11 @@ fn nodes(design: &Design, extra_m: &[f64]) -> Vec<f64> {
 }
 
 fn along_chord(design: &Design, s_m: f64) -> Vec<f64> {
-    design.contour(s_m).into_iter().map(|[x_c, _]| x_c).collect()
+    design
+        .contour(s_m)
+        .into_iter()
+        .map(|[x_c, _]| x_c)
+        .collect()
 }
 
 fn middle(design: &Design, s_m: f64) -> Vector3<f64> {

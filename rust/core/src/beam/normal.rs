@@ -64,6 +64,8 @@ impl Normal {
         self.matrix.fill_upper_triangle_with_lower_triangle();
         let factor = self.matrix.cholesky()?;
         let step = factor.solve(&self.right);
-        step.iter().all(|value| value.is_finite()).then_some((step, factor))
+        step.iter()
+            .all(|value| value.is_finite())
+            .then_some((step, factor))
     }
 }

@@ -47,7 +47,9 @@ impl Posed {
         knot_ns: i64,
     ) -> Self {
         let fields = |all: &[Response]| -> Vec<Field> {
-            all.iter().map(|r| still.field(&mesh.s_m, &r.curvature, &r.root_rad)).collect()
+            all.iter()
+                .map(|r| still.field(&mesh.s_m, &r.curvature, &r.root_rad))
+                .collect()
         };
         let knots = knots(span_ns, knot_ns);
         let steps = (span_ns.1 - span_ns.0) / GRID_NS + 2;
@@ -98,17 +100,30 @@ impl Posed {
 
     /// Knots of the sway at an instant.
     pub fn beat(&self, time_ns: i64) -> Beat {
-        splines((time_ns - self.start_ns) as f64 / self.knot_ns as f64, self.knots)
+        splines(
+            (time_ns - self.start_ns) as f64 / self.knot_ns as f64,
+            self.knots,
+        )
     }
 
     /// How far each unknown of the state moves `along . displacement + about . rotation` of a
     /// section, in the order of the responses.
-    pub fn slopes(&self, section: &Section, along: &Vector3<f64>, about: &Vector3<f64>) -> impl Iterator<Item = f64> {
+    pub fn slopes(
+        &self,
+        section: &Section,
+        along: &Vector3<f64>,
+        about: &Vector3<f64>,
+    ) -> impl Iterator<Item = f64> {
         project(&self.moves, self.unknowns, section, along, about)
     }
 
     /// The same for the sway, per mode.
-    pub fn sway_slopes(&self, section: &Section, along: &Vector3<f64>, about: &Vector3<f64>) -> impl Iterator<Item = f64> {
+    pub fn sway_slopes(
+        &self,
+        section: &Section,
+        along: &Vector3<f64>,
+        about: &Vector3<f64>,
+    ) -> impl Iterator<Item = f64> {
         project(&self.sway_moves, self.modes, section, along, about)
     }
 
@@ -140,6 +155,8 @@ fn project<'a>(
     let weights = [about.x, about.y, about.z, along.x, along.y, along.z];
     let (low, high) = (1.0 - section.share, section.share);
     inner.iter().zip(outer).map(move |(a, b)| {
-        (0..6).map(|k| weights[k] * (low * a[k] + high * b[k])).sum()
+        (0..6)
+            .map(|k| weights[k] * (low * a[k] + high * b[k]))
+            .sum()
     })
 }

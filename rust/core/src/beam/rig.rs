@@ -51,14 +51,23 @@ impl Rig {
             expected: format!("{count} x {count}, positive"),
             found,
         };
-        if covariance.shape() != (count, count) || prior.len() != count || poses.len() != channels.len() {
-            return Err(refuse(format!("{:?} and {} values", covariance.shape(), prior.len())));
+        if covariance.shape() != (count, count)
+            || prior.len() != count
+            || poses.len() != channels.len()
+        {
+            return Err(refuse(format!(
+                "{:?} and {} values",
+                covariance.shape(),
+                prior.len()
+            )));
         }
         // An exactly known value would make the inverse infinite.
         for (i, floor) in floors(&channels).into_iter().enumerate() {
             covariance[(i, i)] += floor * floor;
         }
-        let factor = covariance.cholesky().ok_or_else(|| refuse("one that is not positive".into()))?;
+        let factor = covariance
+            .cholesky()
+            .ok_or_else(|| refuse("one that is not positive".into()))?;
         Ok(Self {
             poses,
             channels,
@@ -121,7 +130,13 @@ impl Lidar {
     }
 
     /// How a lidar's unknowns move `along . displacement` of a contact against its rays; from `first`.
-    pub fn slopes(&self, contact: &Contact, along: &Vector3<f64>, first: usize, out: &mut Vec<(usize, f64)>) {
+    pub fn slopes(
+        &self,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        first: usize,
+        out: &mut Vec<(usize, f64)>,
+    ) {
         let lever = contact.point - self.origin;
         let turn = along.cross(&lever);
         for k in 0..3 {

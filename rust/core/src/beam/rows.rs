@@ -71,7 +71,11 @@ impl Weights {
     pub fn learn(&mut self, tallies: &[Tally]) {
         for lidar in 0..self.noise_m.len() {
             let of = |t: &Tally| -> Vec<f64> {
-                t.used.iter().filter(|u| u.lidar == lidar).map(|u| u.residual_m.abs()).collect()
+                t.used
+                    .iter()
+                    .filter(|u| u.lidar == lidar)
+                    .map(|u| u.residual_m.abs())
+                    .collect()
             };
             let mut sizes: Vec<f64> = tallies.iter().flat_map(of).collect();
             if sizes.len() > 200 {
@@ -97,7 +101,12 @@ pub struct Rows<'a> {
 
 impl<'a> Rows<'a> {
     /// For a hold as estimated so far.
-    pub fn new(adjustment: &'a Adjustment, hold: usize, lidars: &'a [Lidar], gates: &'a Gates) -> Self {
+    pub fn new(
+        adjustment: &'a Adjustment,
+        hold: usize,
+        lidars: &'a [Lidar],
+        gates: &'a Gates,
+    ) -> Self {
         Self {
             lidars,
             gates,
@@ -113,7 +122,11 @@ impl<'a> Rows<'a> {
     /// All rows, and what became of the data.
     pub fn collect(mut self) -> (Normal, Tally) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let stride = seen.echoes.len().div_ceil(self.adjustment.weights.echoes).max(1);
+        let stride = seen
+            .echoes
+            .len()
+            .div_ceil(self.adjustment.weights.echoes)
+            .max(1);
         let mut hint = None;
         for echo in seen.echoes.iter().step_by(stride) {
             hint = self.add_echo(echo, hint);
@@ -160,7 +173,13 @@ impl<'a> Rows<'a> {
         arc_m
     }
 
-    fn hit(&self, echo: &Echo, lidar: &Lidar, direction: &Vector3<f64>, hint: Option<f64>) -> Option<Hit> {
+    fn hit(
+        &self,
+        echo: &Echo,
+        lidar: &Lidar,
+        direction: &Vector3<f64>,
+        hint: Option<f64>,
+    ) -> Option<Hit> {
         let mesh = &self.adjustment.problem.mesh;
         let blade = self.posed.at(echo.time_ns);
         let near = hint.and_then(|s_m| blade.hit(mesh, &lidar.origin, direction, s_m));
@@ -181,14 +200,22 @@ impl<'a> Rows<'a> {
         let (layout, values) = (&self.adjustment.layout, &self.adjustment.values);
         let surface = layout.shape_at()..layout.edge_at();
         let of_surface = row.iter().filter(|entry| surface.contains(&entry.0));
-        of_surface.map(|(unknown, slope)| slope * values[*unknown]).sum()
+        of_surface
+            .map(|(unknown, slope)| slope * values[*unknown])
+            .sum()
     }
 
     fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
         let along = -hit.contact.normal / hit.cosine;
         let mut row = self.row(&hit.contact, &along, echo.lidar, echo.time_ns);
         let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
-        problem.shape.waves(&problem.mesh, &hit.contact, &along, layout.shape_at(), &mut row);
+        problem.shape.waves(
+            &problem.mesh,
+            &hit.contact,
+            &along,
+            layout.shape_at(),
+            &mut row,
+        );
         let first = layout.lidar_at(echo.lidar);
         row.push((first + 7, -hit.range_m));
         if echo.ring < layout.channels[echo.lidar] {
@@ -198,7 +225,13 @@ impl<'a> Rows<'a> {
     }
 
     /// How all unknowns but range errors move `along . displacement` of a contact against the lidar.
-    fn row(&self, contact: &Contact, along: &Vector3<f64>, lidar: usize, time_ns: i64) -> Vec<(usize, f64)> {
+    fn row(
+        &self,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        lidar: usize,
+        time_ns: i64,
+    ) -> Vec<(usize, f64)> {
         let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
         let about = (contact.point - contact.section.place).cross(along);
         let slopes = self.posed.slopes(&contact.section, along, &about);
@@ -208,9 +241,14 @@ impl<'a> Rows<'a> {
         for (mode, slope) in sway.enumerate() {
             let first = layout.sway_at(self.hold) + mode * layout.knots[self.hold] + knot;
             let parts = weights.iter().enumerate();
-            row.extend(parts.map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])));
+            row.extend(
+                parts
+                    .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
+            );
         }
-        problem.shape.slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
+        problem
+            .shape
+            .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
         row
     }
@@ -239,7 +277,13 @@ impl<'a> Rows<'a> {
         self.add_silhouette(edge, &plane, &silhouette, step_rad);
     }
 
-    fn add_silhouette(&mut self, edge: &Edge, plane: &ScanPlane, silhouette: &Silhouette, step_rad: f64) {
+    fn add_silhouette(
+        &mut self,
+        edge: &Edge,
+        plane: &ScanPlane,
+        silhouette: &Silhouette,
+        step_rad: f64,
+    ) {
         let layout = &self.adjustment.layout;
         let side = side_of(silhouette.contact.x_c);
         let at = layout.edge_offset_at(self.hold, edge.lidar, side);
@@ -257,14 +301,21 @@ impl<'a> Rows<'a> {
             self.tally.edges_left_out[2] += 1;
             return;
         }
-        self.tally.edges.push((edge.lidar, side, residual / step_rad));
+        self.tally
+            .edges
+            .push((edge.lidar, side, residual / step_rad));
         row.push((layout.edge_at(), EDGE_RAD));
         row.push((at, EDGE_OFFSET_RAD));
         let weight = robust(residual, sigma, gate_rad) / (sigma * sigma);
         self.normal.add(&mut row, residual, weight);
     }
 
-    fn edge_row(&self, edge: &Edge, plane: &ScanPlane, silhouette: &Silhouette) -> Vec<(usize, f64)> {
+    fn edge_row(
+        &self,
+        edge: &Edge,
+        plane: &ScanPlane,
+        silhouette: &Silhouette,
+    ) -> Vec<(usize, f64)> {
         let to = silhouette.contact.point - plane.origin;
         let range = to.norm();
         let aside = (plane.aside - to * (plane.aside.dot(&to) / (range * range))).normalize();

@@ -46,7 +46,10 @@ pub fn design() -> Design {
 /// Even noise of unit deviation, the same in every run.
 fn noise(place: usize) -> f64 {
     let uniform = |seed: f64| (seed.sin() * 43_758.547).rem_euclid(1.0);
-    (0..12).map(|k| uniform((12 * place + k) as f64 + 0.37)).sum::<f64>() - 6.0
+    (0..12)
+        .map(|k| uniform((12 * place + k) as f64 + 0.37))
+        .sum::<f64>()
+        - 6.0
 }
 
 /// An adjustment at its start whose echoes come from that very state, `shift_m` too far away.
@@ -71,7 +74,9 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
         mesh,
     };
     let size = RIG + CHANNELS;
-    let turn = Rotation3::from_matrix_unchecked(Matrix3::new(-1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0));
+    let turn = Rotation3::from_matrix_unchecked(Matrix3::new(
+        -1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0,
+    ));
     let pose = WorldFromSensor::new(turn, Vector3::new(2.0, -7.0, 48.0));
     let rig = Rig::new(
         vec![pose],
@@ -92,7 +97,11 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
 
 /// What the lidar sees of the present state, through lines whose phase wanders.
 fn look(adjustment: &Adjustment, shift_m: f64) -> Seen {
-    let (mesh, posed, lidar) = (&adjustment.problem.mesh, adjustment.posed(0), adjustment.rig.lidar(0));
+    let (mesh, posed, lidar) = (
+        &adjustment.problem.mesh,
+        adjustment.posed(0),
+        adjustment.rig.lidar(0),
+    );
     let mut seen = Seen::default();
     let mut count = 0;
     for sweep in 0..8 {
@@ -101,11 +110,17 @@ fn look(adjustment: &Adjustment, shift_m: f64) -> Seen {
             let mut line = Vec::new();
             for shot in 0..400 {
                 let phase = 0.618 * (sweep * CHANNELS + ring) as f64;
-                let azimuth = 0.0035 * (f64::from(shot) - 200.0 + phase.fract()) - std::f64::consts::FRAC_PI_2;
+                let azimuth = 0.0035 * (f64::from(shot) - 200.0 + phase.fract())
+                    - std::f64::consts::FRAC_PI_2;
                 let (sin, cos) = azimuth.sin_cos();
-                let sensor = Vector3::new(cos * elevation.cos(), sin * elevation.cos(), elevation.sin());
+                let sensor = Vector3::new(
+                    cos * elevation.cos(),
+                    sin * elevation.cos(),
+                    elevation.sin(),
+                );
                 let direction = lidar.direction(&sensor);
-                let time_ns = sweep as i64 * 100_000_000 + i64::from(shot) * 55_000 + ring as i64 * 1_000;
+                let time_ns =
+                    sweep as i64 * 100_000_000 + i64::from(shot) * 55_000 + ring as i64 * 1_000;
                 let blade = posed.at(time_ns);
                 let start = blade.nearest_s_m(mesh, &lidar.origin, &direction);
                 if let Some(hit) = blade.hit(mesh, &lidar.origin, &direction, start) {

@@ -32,7 +32,9 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn sections(&self, s_m: &[f64], gates: &Gates) -> Result<Sections, BeamError> {
-        let posed: Vec<Posed> = (0..self.problem.holds.len()).map(|hold| self.posed(hold)).collect();
+        let posed: Vec<Posed> = (0..self.problem.holds.len())
+            .map(|hold| self.posed(hold))
+            .collect();
         let count = posed.len() * s_m.len();
         let mut values = Vec::with_capacity(count);
         let mut rows = DMatrix::zeros(self.layout.len(), 4 * count);
@@ -43,7 +45,14 @@ impl Adjustment {
                 let rest = self.place_at(&posed[0], 0, *s, None);
                 values.push(self.fill_state(&mut rows, first, blade, hold, &at, &rest));
                 let (_, slopes) = twist(&self.problem.mesh, &rest, &at);
-                self.fill(&mut rows, first + 3, (&posed[0], 0), &rest, &Vector3::zeros(), &slopes[0]);
+                self.fill(
+                    &mut rows,
+                    first + 3,
+                    (&posed[0], 0),
+                    &rest,
+                    &Vector3::zeros(),
+                    &slopes[0],
+                );
             }
         }
         let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
@@ -63,15 +72,35 @@ impl Adjustment {
     ) -> [f64; 4] {
         for axis in 0..3 {
             let along = Vector3::ith(axis, 1.0);
-            self.fill(rows, first + axis, (posed, hold), at, &along, &Vector3::zeros());
+            self.fill(
+                rows,
+                first + axis,
+                (posed, hold),
+                at,
+                &along,
+                &Vector3::zeros(),
+            );
         }
         let (twist, slopes) = twist(&self.problem.mesh, rest, at);
-        self.fill(rows, first + 3, (posed, hold), at, &Vector3::zeros(), &slopes[1]);
+        self.fill(
+            rows,
+            first + 3,
+            (posed, hold),
+            at,
+            &Vector3::zeros(),
+            &slopes[1],
+        );
         [at.point.x, at.point.y, at.point.z, twist]
     }
 
     /// A section of a hold at an instant, or averaged over the hold.
-    pub(super) fn place_at(&self, blade: &Posed, hold: usize, s_m: f64, time_ns: Option<i64>) -> Place {
+    pub(super) fn place_at(
+        &self,
+        blade: &Posed,
+        hold: usize,
+        s_m: f64,
+        time_ns: Option<i64>,
+    ) -> Place {
         let mesh = &self.problem.mesh;
         let section = match time_ns {
             None => blade.at_rest().section(mesh, s_m),
@@ -127,7 +156,11 @@ impl Adjustment {
             self.fill(&mut rows, axis, of, place, &along, &Vector3::zeros());
         }
         let mut values = self.values.clone();
-        let posed = if has_sway { self.layout.sway_at(0) } else { self.layout.lidar_at(0) };
+        let posed = if has_sway {
+            self.layout.sway_at(0)
+        } else {
+            self.layout.lidar_at(0)
+        };
         values.rows_mut(0, posed).fill(0.0);
         Vector3::from_iterator(rows.tr_mul(&values).iter().copied())
     }
@@ -156,7 +189,13 @@ impl Adjustment {
         }
         let mut shape = Vec::new();
         let problem = &self.problem;
-        problem.shape.slopes(&problem.mesh, &place.contact, along, layout.shape_at(), &mut shape);
+        problem.shape.slopes(
+            &problem.mesh,
+            &place.contact,
+            along,
+            layout.shape_at(),
+            &mut shape,
+        );
         for (unknown, slope) in shape {
             rows[(unknown, column)] += slope;
         }
@@ -167,13 +206,17 @@ impl Adjustment {
 /// both sections about the world axes.
 fn twist(mesh: &Mesh, rest: &Place, now: &Place) -> (f64, [Vector3<f64>; 2]) {
     let of = |rest_turn: &Vector3<f64>, turn: &Vector3<f64>| {
-        let (a, b) = (Rotation3::from_scaled_axis(*rest_turn), Rotation3::from_scaled_axis(*turn));
-        mesh.hand * twist_rad(
-            &(a * tangent(&rest.contact.section)),
-            &(a * rest.chord),
-            &(b * tangent(&now.contact.section)),
-            &(b * now.chord),
-        )
+        let (a, b) = (
+            Rotation3::from_scaled_axis(*rest_turn),
+            Rotation3::from_scaled_axis(*turn),
+        );
+        mesh.hand
+            * twist_rad(
+                &(a * tangent(&rest.contact.section)),
+                &(a * rest.chord),
+                &(b * tangent(&now.contact.section)),
+                &(b * now.chord),
+            )
     };
     let zero = Vector3::zeros();
     let step = 1e-5;
@@ -183,7 +226,10 @@ fn twist(mesh: &Mesh, rest: &Place, now: &Place) -> (f64, [Vector3<f64>; 2]) {
             (of(&turn) - of(&-turn)) / (2.0 * step)
         })
     };
-    let slopes = [slope(&|turn| of(turn, &zero)), slope(&|turn| of(&zero, turn))];
+    let slopes = [
+        slope(&|turn| of(turn, &zero)),
+        slope(&|turn| of(&zero, turn)),
+    ];
     (of(&zero, &zero), slopes)
 }
 
@@ -193,7 +239,12 @@ fn tangent(section: &Section) -> Vector3<f64> {
 
 /// Angle about the tangent from the chord at rest, carried by the smallest rotation between both
 /// tangents, to the chord now.
-pub fn twist_rad(rest_tangent: &Vector3<f64>, rest_chord: &Vector3<f64>, tangent: &Vector3<f64>, chord: &Vector3<f64>) -> f64 {
+pub fn twist_rad(
+    rest_tangent: &Vector3<f64>,
+    rest_chord: &Vector3<f64>,
+    tangent: &Vector3<f64>,
+    chord: &Vector3<f64>,
+) -> f64 {
     let smallest = Rotation3::rotation_between(rest_tangent, tangent).unwrap_or_default();
     let carried = smallest * rest_chord;
     carried.cross(chord).dot(tangent).atan2(carried.dot(chord))

@@ -78,7 +78,14 @@ impl Shape {
 
     /// How far each unknown moves a point of the surface along `along` (world, any length), appended
     /// with its number from `first`.
-    pub fn slopes(&self, mesh: &Mesh, contact: &Contact, along: &Vector3<f64>, first: usize, out: &mut Vec<(usize, f64)>) {
+    pub fn slopes(
+        &self,
+        mesh: &Mesh,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        first: usize,
+        out: &mut Vec<(usize, f64)>,
+    ) {
         let local = contact.section.turn.tr_mul(along);
         let swell = local.dot(&contact.local);
         let twist = mesh.hand * (local.y * contact.local.x - local.x * contact.local.y);
@@ -89,12 +96,22 @@ impl Shape {
         let s_m = self.arc_m(mesh, contact);
         for (knot, weight) in hats(s_m - self.from_m, SLOW_KNOT_M, self.slow) {
             out.push((first + 3 + knot, self.trust.chord_waves * weight * swell));
-            out.push((first + 3 + self.slow + knot, self.trust.twist_waves_rad * weight * twist));
+            out.push((
+                first + 3 + self.slow + knot,
+                self.trust.twist_waves_rad * weight * twist,
+            ));
         }
     }
 
     /// The same for the waves, which stand out along the normal.
-    pub fn waves(&self, mesh: &Mesh, contact: &Contact, along: &Vector3<f64>, first: usize, out: &mut Vec<(usize, f64)>) {
+    pub fn waves(
+        &self,
+        mesh: &Mesh,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        first: usize,
+        out: &mut Vec<(usize, f64)>,
+    ) {
         let outward = self.trust.waves_m * along.dot(&contact.normal);
         let side = usize::from(contact.vertex >= mesh.outline[0].len() / 2);
         let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;

@@ -187,8 +187,15 @@ impl Instant<'_> {
         let views: Vec<View> = (0..count).map(|vertex| view(vertex, s_m)).collect();
         let outermost = (0..count).max_by(|a, b| views[*a].angle.total_cmp(&views[*b].angle))?;
         let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
-        let refined = near.map(|vertex| (vertex, self.refine(mesh, plane, &across, vertex, views[vertex].s_m)));
-        let best = refined.iter().max_by(|a, b| a.1.angle.total_cmp(&b.1.angle))?;
+        let refined = near.map(|vertex| {
+            (
+                vertex,
+                self.refine(mesh, plane, &across, vertex, views[vertex].s_m),
+            )
+        });
+        let best = refined
+            .iter()
+            .max_by(|a, b| a.1.angle.total_cmp(&b.1.angle))?;
         if !(0.0..=mesh.length_m()).contains(&best.1.s_m) {
             return None;
         }
@@ -203,13 +210,27 @@ impl Instant<'_> {
         })
     }
 
-    fn refine(&self, mesh: &Mesh, plane: &ScanPlane, across: &Vector3<f64>, vertex: usize, s_m: f64) -> View {
+    fn refine(
+        &self,
+        mesh: &Mesh,
+        plane: &ScanPlane,
+        across: &Vector3<f64>,
+        vertex: usize,
+        s_m: f64,
+    ) -> View {
         let once = self.seen(mesh, plane, across, vertex, s_m);
         self.seen(mesh, plane, across, vertex, once.s_m)
     }
 
     /// Where a point of the outline passes through a scan plane, by its slope at `s_m`.
-    fn seen(&self, mesh: &Mesh, plane: &ScanPlane, across: &Vector3<f64>, vertex: usize, s_m: f64) -> View {
+    fn seen(
+        &self,
+        mesh: &Mesh,
+        plane: &ScanPlane,
+        across: &Vector3<f64>,
+        vertex: usize,
+        s_m: f64,
+    ) -> View {
         let section = self.section(mesh, s_m);
         let contact = contact(mesh, section, vertex, 0.0);
         let slope = section.turn * span_slope(mesh, &section, vertex, 0.0, &contact.local);
@@ -237,7 +258,11 @@ struct View {
 /// Width across the view of the facets beside the silhouette that are seen at a grazing angle.
 fn softness_m(views: &[View], outermost: usize) -> f64 {
     let count = views.len();
-    let step = if is_seen_ahead(views, outermost) { 1 } else { count - 1 };
+    let step = if is_seen_ahead(views, outermost) {
+        1
+    } else {
+        count - 1
+    };
     let mut width_m = 0.0;
     let mut a = outermost;
     for _ in 0..count / 2 {
@@ -273,7 +298,12 @@ fn is_seen_ahead(views: &[View], outermost: usize) -> bool {
 
 /// First facet of the outline that a line in the section's plane enters: its first point, the place
 /// on it, and the distance along the line.
-fn cross(mesh: &Mesh, section: &Section, from: &Vector3<f64>, way: &Vector3<f64>) -> Option<(usize, f64, f64)> {
+fn cross(
+    mesh: &Mesh,
+    section: &Section,
+    from: &Vector3<f64>,
+    way: &Vector3<f64>,
+) -> Option<(usize, f64, f64)> {
     let (inner, outer) = (&mesh.outline[section.node], &mesh.outline[section.node + 1]);
     let at = |i: usize| {
         let (a, b) = (inner[i], outer[i]);
@@ -330,18 +360,37 @@ fn contact(mesh: &Mesh, section: Section, vertex: usize, along: f64) -> Contact 
 }
 
 /// How a point of the surface moves along the span, in the section's directions.
-fn span_slope(mesh: &Mesh, section: &Section, vertex: usize, along: f64, local: &Vector3<f64>) -> Vector3<f64> {
+fn span_slope(
+    mesh: &Mesh,
+    section: &Section,
+    vertex: usize,
+    along: f64,
+    local: &Vector3<f64>,
+) -> Vector3<f64> {
     let inner = outline_at(mesh, section.node, vertex, along);
     let outer = outline_at(mesh, section.node + 1, vertex, along);
     let length = mesh.step_m(section.node);
-    let taper = Vector3::new((outer[0] - inner[0]) / length, (outer[1] - inner[1]) / length, 1.0);
+    let taper = Vector3::new(
+        (outer[0] - inner[0]) / length,
+        (outer[1] - inner[1]) / length,
+        1.0,
+    );
     taper + section.curvature.cross(local)
 }
 
-fn outward(mesh: &Mesh, section: &Section, vertex: usize, along: f64, local: &Vector3<f64>) -> Vector3<f64> {
+fn outward(
+    mesh: &Mesh,
+    section: &Section,
+    vertex: usize,
+    along: f64,
+    local: &Vector3<f64>,
+) -> Vector3<f64> {
     let count = mesh.outline[0].len();
     let end = |i: usize| {
-        let (a, b) = (mesh.outline[section.node][i], mesh.outline[section.node + 1][i]);
+        let (a, b) = (
+            mesh.outline[section.node][i],
+            mesh.outline[section.node + 1][i],
+        );
         [0, 1].map(|k| a[k] + (b[k] - a[k]) * section.share)
     };
     let (a, b) = (end(vertex), end((vertex + 1) % count));

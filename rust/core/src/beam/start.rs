@@ -25,11 +25,27 @@ pub fn forces_for(
     let unloaded = Physics::unloaded(mesh, saddles);
     let rest = unloaded.solve(mesh, &mesh.free)?;
     let far = (0..s_m.len()).max_by(|a, b| deflection_m[*a].total_cmp(&deflection_m[*b]))?;
-    let (mut axis, even) = even_force(mesh, &unloaded, &rest, direction, (s_m[far], deflection_m[far]))?;
+    let (mut axis, even) = even_force(
+        mesh,
+        &unloaded,
+        &rest,
+        direction,
+        (s_m[far], deflection_m[far]),
+    )?;
     let mut forces = vec![even; saddles.len()];
     for _ in 0..4 {
-        let change = spread(mesh, &rest, &axis, (&forces, even, direction), &unloaded, (s_m, deflection_m))?;
-        forces.iter_mut().zip(change.iter()).for_each(|(force, step)| *force += step);
+        let change = spread(
+            mesh,
+            &rest,
+            &axis,
+            (&forces, even, direction),
+            &unloaded,
+            (s_m, deflection_m),
+        )?;
+        forces
+            .iter_mut()
+            .zip(change.iter())
+            .for_each(|(force, step)| *force += step);
         axis = loaded(&unloaded, &forces, direction).solve(mesh, &axis.curvature)?;
     }
     Some(forces)
@@ -60,7 +76,8 @@ fn even_force(
     let mut axis = rest.clone();
     let mut force = 1e3;
     for _ in 0..60 {
-        let next = loaded(unloaded, &vec![force; saddles], direction).solve(mesh, &axis.curvature)?;
+        let next =
+            loaded(unloaded, &vec![force; saddles], direction).solve(mesh, &axis.curvature)?;
         let reached = moved(mesh, rest, &next, s_m).norm();
         axis = next;
         if (reached / wanted_m - 1.0).abs() < 1e-3 {
@@ -93,8 +110,14 @@ fn spread(
     let mut slopes = DMatrix::<f64>::zeros(sections, count);
     for saddle in 0..count {
         for axis_number in 0..3 {
-            let kind = Kind::Force { saddle, axis: axis_number };
-            let unknown = Unknown { kind, sigma: SPREAD * even };
+            let kind = Kind::Force {
+                saddle,
+                axis: axis_number,
+            };
+            let unknown = Unknown {
+                kind,
+                sigma: SPREAD * even,
+            };
             let response = family::responses(mesh, &physics, axis, &[unknown])?;
             let field = &family::fields(mesh, axis, &response)[0];
             for (row, s) in s_m.iter().enumerate() {

@@ -75,7 +75,10 @@ impl Adjustment {
             return self.problem.full_n.clone();
         };
         let forces = self.physics(hold).forces;
-        forces.iter().map(|(_, force)| force / loads[hold]).collect()
+        forces
+            .iter()
+            .map(|(_, force)| force / loads[hold])
+            .collect()
     }
 
     /// An adjustment of one hold with this one's lidars and weights, without values.
@@ -100,10 +103,14 @@ impl Adjustment {
     /// Values of this adjustment for the part: what is shared, and what lies between its holds.
     fn hand_down(&self, part: &mut Adjustment, stretch: &Stretch, loads: &[f64], middle: f64) {
         let shared = self.layout.shared;
-        part.values.rows_mut(0, shared).copy_from(&self.values.rows(0, shared));
+        part.values
+            .rows_mut(0, shared)
+            .copy_from(&self.values.rows(0, shared));
         let (from, to) = (self.layout.shape_at(), part.layout.shape_at());
         let count = self.layout.shape + 1; // the edge angle stands behind the surface
-        part.values.rows_mut(to, count).copy_from(&self.values.rows(from, count));
+        part.values
+            .rows_mut(to, count)
+            .copy_from(&self.values.rows(from, count));
         let (low, high, share) = neighbours(loads, middle);
         for lidar in 0..self.layout.channels.len() {
             for side in 0..2 {
@@ -114,9 +121,8 @@ impl Adjustment {
         }
         let first = part.layout.own_at(0);
         for (k, unknown) in part.own[0].iter().enumerate() {
-            let of = |hold: usize| {
-                self.values[self.layout.own_at(hold) + k] * self.own[hold][k].sigma
-            };
+            let of =
+                |hold: usize| self.values[self.layout.own_at(hold) + k] * self.own[hold][k].sigma;
             let value = of(low) * (1.0 - share) + of(high) * share;
             part.values[first + k] = value / unknown.sigma;
             part.tightness[first + k] = OWN_TIGHTNESS;
@@ -156,14 +162,22 @@ impl Adjustment {
             let free = rows.rows(self.free.start, self.free.len()).into_owned();
             let spread = factor.solve(&free);
             let variance = |k: usize| free.column(k).dot(&spread.column(k));
-            found.variances.extend((0..s_m.len()).map(|i| [0, 1, 2, 3].map(|k| variance(4 * i + k))));
+            found
+                .variances
+                .extend((0..s_m.len()).map(|i| [0, 1, 2, 3].map(|k| variance(4 * i + k))));
             found.values.extend(values);
         }
         Ok(found)
     }
 
     /// States of sections of one hold at an instant and their slopes by all unknowns.
-    pub fn states_at(&self, reference: &Adjustment, hold: usize, s_m: &[f64], time_ns: i64) -> (Vec<[f64; 4]>, DMatrix<f64>) {
+    pub fn states_at(
+        &self,
+        reference: &Adjustment,
+        hold: usize,
+        s_m: &[f64],
+        time_ns: i64,
+    ) -> (Vec<[f64; 4]>, DMatrix<f64>) {
         let (posed, rest) = (self.posed(hold), reference.posed(0));
         let mut rows = DMatrix::zeros(self.layout.len(), 4 * s_m.len());
         let mut values = Vec::with_capacity(s_m.len());

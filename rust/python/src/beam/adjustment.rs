@@ -9,7 +9,9 @@ use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
 use lidar_deflect_core::error::InvalidValue;
 use lidar_deflect_core::frame::WorldFromSensor;
 use nalgebra::{DMatrix, DVector, Vector3};
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
@@ -69,11 +71,22 @@ impl BeamAdjustment {
                     .outer_iter()
                     .map(|f| Vector3::new(f[0], f[1], f[2]))
                     .collect(),
-                full_n: full_n.as_array().outer_iter().map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt()).sum(),
+                full_n: full_n
+                    .as_array()
+                    .outer_iter()
+                    .map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt())
+                    .sum(),
             },
         };
         let [stiffness, weight, prebend, free_rad_m, root_rad] = trust;
-        let [chord, chord_waves, setting_rad, twist_waves_rad, axis_fraction, waves_m] = shape_trust;
+        let [
+            chord,
+            chord_waves,
+            setting_rad,
+            twist_waves_rad,
+            axis_fraction,
+            waves_m,
+        ] = shape_trust;
         let shape = ShapeTrust {
             chord,
             chord_waves,
@@ -93,7 +106,11 @@ impl BeamAdjustment {
                 root_rad,
             },
             shape: Shape::new(&blade.mesh, shape, from_m),
-            full_n: full_n.as_array().outer_iter().map(|f| Vector3::new(f[0], f[1], f[2])).collect(),
+            full_n: full_n
+                .as_array()
+                .outer_iter()
+                .map(|f| Vector3::new(f[0], f[1], f[2]))
+                .collect(),
             holds: (0..seen.len()).map(hold).collect(),
         };
         let matrices = arrays::matrices("poses", &poses, channels.len())?;
@@ -109,7 +126,10 @@ impl BeamAdjustment {
         let rig = Rig::new(
             poses?,
             channels,
-            DVector::from_iterator(rig_prior.as_array().len(), rig_prior.as_array().iter().copied()),
+            DVector::from_iterator(
+                rig_prior.as_array().len(),
+                rig_prior.as_array().iter().copied(),
+            ),
             DMatrix::from_fn(rows, columns, |i, j| covariance[(i, j)]),
         )?;
         let core = compute(py, threads, || Adjustment::new(problem, rig, weights))??;
@@ -123,7 +143,13 @@ impl BeamAdjustment {
     }
 
     /// One step with data inside of the gates; what became of them, by hold.
-    fn step<'py>(&mut self, py: Python<'py>, echo_m: f64, edge_m: f64, stage: &str) -> BorderResult<Bound<'py, PyDict>> {
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        echo_m: f64,
+        edge_m: f64,
+        stage: &str,
+    ) -> BorderResult<Bound<'py, PyDict>> {
         let core = &mut self.core;
         let gates = Gates {
             echo_m,
@@ -171,7 +197,8 @@ impl BeamAdjustment {
         times_ns: Vec<i64>,
     ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
         let at = |time: &i64| self.core.states_at(&self.core, hold, &s_m, *time).0;
-        let values: Vec<[f64; 4]> = compute(py, self.threads, || times_ns.iter().flat_map(at).collect())?;
+        let values: Vec<[f64; 4]> =
+            compute(py, self.threads, || times_ns.iter().flat_map(at).collect())?;
         Ok(arrays::rows(py, values)?)
     }
 
@@ -194,7 +221,15 @@ impl BeamAdjustment {
         s_m: Vec<f64>,
         hold_loads: Vec<f64>,
         gates: Vec<(f64, f64)>,
-    ) -> BorderResult<Vec<Option<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>, Bound<'py, PyDict>)>>> {
+    ) -> BorderResult<
+        Vec<
+            Option<(
+                Bound<'py, PyArray2<f64>>,
+                Bound<'py, PyArray2<f64>>,
+                Bound<'py, PyDict>,
+            )>,
+        >,
+    > {
         let stretches: Vec<Stretch> = seen
             .iter()
             .zip(spans_ns.iter().zip(&loads))
@@ -218,11 +253,19 @@ impl BeamAdjustment {
             part.follow(core, &s_m, times, &gates).ok()
         };
         let found: Vec<_> = compute(py, self.threads, || {
-            stretches.par_iter().zip(times_ns.par_iter()).map(follow).collect()
+            stretches
+                .par_iter()
+                .zip(times_ns.par_iter())
+                .map(follow)
+                .collect()
         })?;
         let hand = |followed: Option<Followed>| -> PyResult<_> {
             let Some(f) = followed else { return Ok(None) };
-            let parts = (arrays::rows(py, f.values)?, arrays::rows(py, f.variances)?, tally(py, &f.tally)?);
+            let parts = (
+                arrays::rows(py, f.values)?,
+                arrays::rows(py, f.variances)?,
+                tally(py, &f.tally)?,
+            );
             Ok(Some(parts))
         };
         Ok(found.into_iter().map(hand).collect::<PyResult<Vec<_>>>()?)
@@ -260,7 +303,15 @@ fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
     told.set_item("ring", column(py, used.iter().map(|u| u.ring as u32)))?;
     told.set_item("s_m", column(py, used.iter().map(|u| u.s_m)))?;
     told.set_item("residual_m", column(py, used.iter().map(|u| u.residual_m)))?;
-    told.set_item("xyz_m", arrays::rows(py, used.iter().map(|u| u.point.into()).collect::<Vec<[f64; 3]>>())?)?;
+    told.set_item(
+        "xyz_m",
+        arrays::rows(
+            py,
+            used.iter()
+                .map(|u| u.point.into())
+                .collect::<Vec<[f64; 3]>>(),
+        )?,
+    )?;
     told.set_item("edges", tally.edges.clone())?;
     told.set_item("missed", tally.missed)?;
     told.set_item("rejected", tally.rejected)?;
@@ -269,7 +320,10 @@ fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
     Ok(told)
 }
 
-fn column<T: numpy::Element>(py: Python<'_>, values: impl Iterator<Item = T>) -> Bound<'_, PyArray1<T>> {
+fn column<T: numpy::Element>(
+    py: Python<'_>,
+    values: impl Iterator<Item = T>,
+) -> Bound<'_, PyArray1<T>> {
     values.collect::<Vec<T>>().into_pyarray(py)
 }
 

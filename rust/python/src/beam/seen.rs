@@ -13,7 +13,6 @@ use crate::arrays;
 use crate::capture::CaptureScan;
 use crate::capture::feed::{Feed, Want};
 use crate::error::BorderResult;
-use crate::paper::cuts;
 
 /// What the lidars saw of the blade in a stretch of time.
 #[pyclass(frozen, module = "lidar_deflect._native")]
@@ -66,7 +65,11 @@ pub fn beam_seen(
         let more = feed.block(py, progress.as_ref(), |datagram| {
             reader.push(datagram);
             take(&mut reader, &mut gather, &lidars);
-            if reader.is_done() { Want::Stop } else { Want::More }
+            if reader.is_done() {
+                Want::Stop
+            } else {
+                Want::More
+            }
         })?;
         if !more || reader.is_done() {
             break;
@@ -76,7 +79,11 @@ pub fn beam_seen(
         reader.finish();
         take(&mut reader, &mut gather, &lidars);
     });
-    Ok(gather.finish().into_iter().map(|seen| BeamSeen { seen }).collect())
+    Ok(gather
+        .finish()
+        .into_iter()
+        .map(|seen| BeamSeen { seen })
+        .collect())
 }
 
 fn take(reader: &mut SweepReader, gather: &mut Gather, lidars: &[usize]) {
@@ -88,4 +95,13 @@ fn take(reader: &mut SweepReader, gather: &mut Gather, lidars: &[usize]) {
         }
         reader.recycle(number, sweep.cloud);
     }
+}
+
+/// Cut azimuths by number of the lidar, as the reader wants them.
+fn cuts(lidars: &[usize], degrees: &[f64]) -> Vec<f64> {
+    let mut by_number = vec![0.0; lidars.iter().max().map_or(0, |last| last + 1)];
+    for (number, cut) in lidars.iter().zip(degrees) {
+        by_number[*number] = cut.to_radians();
+    }
+    by_number
 }
