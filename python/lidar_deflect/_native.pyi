@@ -404,6 +404,7 @@ def beam_seen(
     windows_ns: Sequence[tuple[int, int]],
     progress: Callable[[int, int], None] | None = None,
 ) -> list[BeamSeen]: ...
+
 @final
 class BeamAdjustment:
     def __new__(

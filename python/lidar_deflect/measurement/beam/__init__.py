@@ -1,7 +1,7 @@
 """The beam method: a blade that bends as blades bend, fitted to every ray and edge at its own time.
 
-`measure` adjusts all holds together with lidars and surface, then follows the blade between them; the
-numbers are made in Rust. Source: docs/method.md.
+`measure` adjusts all holds together with lidars and surface, then follows the blade between them;
+the numbers are made in Rust. Source: docs/method.md.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def measure(inputs: Inputs) -> States:
     moved = followed.values[..., :3] - reference
     uncertainty = over_time(covariance, solved, expected, followed, times_ns, moved)
     of = slice(0, len(sections))
-    status, reason = _grades(followed, times_ns, solved)
+    status, reason = _grades(followed)
     every = max(1, round(inputs.rate_hz))
     return States(
         time_ns=times_ns,
@@ -112,12 +112,10 @@ def _stations(inputs: Inputs) -> list[float]:
     return [float(s) for s in np.arange(first, length + 1e-9, STATION_M)]
 
 
-def _grades(
-    followed: Followed, times_ns: NDArray[np.int64], solved: Solved
-) -> tuple[NDArray[np.uint8], NDArray[np.object_]]:
+def _grades(followed: Followed) -> tuple[NDArray[np.uint8], NDArray[np.object_]]:
     """Status and reason of each moment, shape (t,)."""
-    status = np.full(len(times_ns), OK, dtype=np.uint8)
-    reason = np.full(len(times_ns), None, dtype=object)
+    status = np.full(len(followed.used), OK, dtype=np.uint8)
+    reason = np.full(len(followed.used), None, dtype=object)
     rest = followed.in_hold == 0
     usual = np.median(followed.used[rest], axis=0) if rest.any() else followed.used.max(axis=0)
     few = followed.used.sum(axis=1) < 0.25 * FEW_POINTS * usual.sum()
@@ -191,7 +189,9 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
             "hold": hold.label,
             "share": share,
             "echoes": len(told["residual_m"]),
-            "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2))) if len(told["residual_m"]) else None,
+            "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2)))
+            if len(told["residual_m"])
+            else None,
             "rejected": told["rejected"],
             "edges": len(told["edges"]),
             "edges_left_out": list(told["edges_left_out"]),
