@@ -2,9 +2,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
-RUST := Cargo.toml Cargo.lock $(shell find rust -name '*.rs' -o -name Cargo.toml)
+RUST := Cargo.toml Cargo.lock $(shell find rust -path rust/fuzz -prune -o \( -name '*.rs' -o -name Cargo.toml \) -print)
 
-.PHONY: demo test test-rust test-python lint format bench wheel lock clean help cargo
+.PHONY: demo test test-rust test-python lint format bench fuzz wheel gallery lock clean help cargo
 
 help:
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -37,9 +37,20 @@ format: $(VENV)/tested ## rewrite the sources in the house format
 bench: cargo ## throughput, see benches/README.md
 	cargo bench
 
+# TARGET is a file of rust/fuzz/fuzz_targets; needs a nightly compiler and cargo install cargo-fuzz.
+TARGET ?= datagram
+SECONDS ?= 60
+fuzz: cargo ## look for bytes that break a decoder: make fuzz TARGET=leishen SECONDS=600
+	@cargo fuzz --version >/dev/null 2>&1 || { echo 'cargo-fuzz is missing: cargo install cargo-fuzz; it needs rustup toolchain install nightly' >&2; exit 1; }
+	cd rust/fuzz && cargo +nightly fuzz run $(TARGET) --fuzz-dir . -- -max_total_time=$(SECONDS) -max_len=65536
+
 wheel: $(VENV)/ready cargo ## one stable-ABI wheel in dist/
 	$(BIN)/python tools/third_party.py
 	$(BIN)/maturin build --release --locked --out dist
+
+gallery: $(VENV)/built $(VENV)/tested ## renew the pictures of docs/gallery.md from the demo's report (chromium)
+	$(BIN)/lidar-deflect demo --out target/gallery --overwrite --quiet
+	$(BIN)/python tools/gallery.py target/gallery/results/report.html docs/gallery
 
 lock: $(VENV)/ready ## renew the pinned Python requirements
 	$(BIN)/python -m pip install --quiet uv

@@ -5,6 +5,8 @@
 
 #[path = "../rust/core/tests/support/puck.rs"]
 mod puck;
+#[path = "../rust/core/tests/support/still.rs"]
+mod still;
 
 use std::hint::black_box;
 
@@ -42,12 +44,12 @@ fn plain(payload: &[u8], cos_sin: &[(f64, f64); 16], out: &mut Vec<[f32; 3]>) {
     }
 }
 
-fn second(mode: ReturnMode) -> Vec<Sent> {
+fn seconds(mode: ReturnMode, seconds: f64) -> Vec<Sent> {
     let puck = Puck {
         mode,
         ..Puck::default()
     };
-    puck.packets(1.0)
+    puck.packets(seconds)
 }
 
 fn decode(c: &mut Criterion) {
@@ -62,7 +64,7 @@ fn decode(c: &mut Criterion) {
         ("single", ReturnMode::Strongest),
         ("dual", ReturnMode::Dual),
     ] {
-        let sent = second(mode);
+        let sent = seconds(mode, 1.0);
         let points: u64 = sent
             .iter()
             .map(|s| u64::from(model.tally(&s.payload).points))
@@ -81,11 +83,11 @@ fn decode(c: &mut Criterion) {
                     };
                     decoder.decode(black_box(&packet.payload), place, &mut out);
                 }
-                out.returns.len()
+                out.cloud.len()
             });
         });
     }
-    let sent = second(ReturnMode::Strongest);
+    let sent = seconds(ReturnMode::Strongest, 1.0);
     group.throughput(Throughput::Elements(sent.len() as u64 * 384));
     let mut out = Vec::new();
     group.bench_function("plain twin, positions only", |b| {
@@ -100,9 +102,59 @@ fn decode(c: &mut Criterion) {
     group.finish();
 }
 
+/// Two hundred packets of sensors without a rotor, every shot with all its echoes.
+fn still(c: &mut Criterion) {
+    let mut group = c.benchmark_group("decode still");
+    for writer in still::writers() {
+        let settings = writer.settings.iter();
+        let timed = [
+            "mid-360 1",
+            "mid-360 3",
+            "avia 4",
+            "m1",
+            "mx dual",
+            "e1",
+            "em4",
+        ];
+        for setting in settings.filter(|setting| timed.contains(&setting.name)) {
+            let seen = |shot: usize, echo: usize| still::Seen {
+                range_m: (5 + shot + 20 * echo) as f64,
+                yaw_rad: 0.01 * shot as f64,
+                pitch_rad: 0.02,
+                brightness: 7,
+            };
+            let sent: Vec<Vec<u8>> = (0..200)
+                .map(|number| (setting.encode)(number, &seen))
+                .collect();
+            let points: u64 = sent
+                .iter()
+                .map(|payload| u64::from(writer.model.tally(payload).points))
+                .sum();
+            group.throughput(Throughput::Elements(points));
+            let mut decoder = writer.model.fit(&writer.files).unwrap().decoder;
+            let mut out = Decoded::default();
+            group.bench_function(setting.name, |b| {
+                b.iter(|| {
+                    for payload in &sent {
+                        out.clear();
+                        let place = Place {
+                            time: Timestamp(0),
+                            packet: 0,
+                            mean_rate_rad_per_ns: 0.0,
+                        };
+                        decoder.decode(black_box(payload), place, &mut out);
+                    }
+                    out.cloud.len()
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
 fn stream(c: &mut Criterion) {
     let mut group = c.benchmark_group("stream");
-    let sent = second(ReturnMode::Strongest);
+    let sent = seconds(ReturnMode::Strongest, 10.0);
     group.throughput(Throughput::Elements(sent.len() as u64 * 384));
     group.bench_function("scan", |b| {
         b.iter(|| {
@@ -129,5 +181,5 @@ fn stream(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, decode, stream);
+criterion_group!(benches, decode, still, stream);
 criterion_main!(benches);

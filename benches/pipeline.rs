@@ -4,25 +4,27 @@
 //! test: 1000 elements a second are real time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use lidar_deflect_core::capture::{DatagramReader, PcapWriter};
+use lidar_deflect_core::capture::{DatagramBatch, DatagramReader, PcapWriter};
 use lidar_deflect_core::cluster::line::LineParams;
 use lidar_deflect_core::cluster::radius::{Intervals, RadiusModel};
 use lidar_deflect_core::fit::arc::SpanAxis;
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::paper::curves::Degrees;
 use lidar_deflect_core::paper::frame::{FrameParams, RadiusRule};
-use lidar_deflect_core::paper::frames::{Frame, FrameAssembler};
+use lidar_deflect_core::paper::frames::Frame;
 use lidar_deflect_core::paper::passthrough::PassThrough;
+use lidar_deflect_core::paper::reader::{FramePlan, FrameReader};
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::{Plane, TipLimits};
-use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, SweepOptions, SweepReader};
+use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport};
 use lidar_deflect_core::synthetic::blade::{BuildErrors, Orientation};
 use lidar_deflect_core::synthetic::echo::Optics;
-use lidar_deflect_core::synthetic::lidar::{Clock, LidarPlan, MODELS};
+use lidar_deflect_core::synthetic::lidar::{Clock, LidarPlan};
 use lidar_deflect_core::synthetic::motion::Schedule;
 use lidar_deflect_core::synthetic::network::NetworkPlan;
 use lidar_deflect_core::synthetic::plan::{SaddlePlan, axes};
 use lidar_deflect_core::synthetic::reference::Stations;
+use lidar_deflect_core::synthetic::sensor::Sensor;
 use lidar_deflect_core::synthetic::terrain::GroundPlan;
 use lidar_deflect_core::synthetic::{ScenePlan, Simulation};
 use lidar_deflect_core::time::Timestamp;
@@ -36,7 +38,9 @@ const PLACES_M: [f64; 4] = [86.0, 94.0, 102.0, 109.5];
 
 fn lidar(index: u8, z_m: f64) -> LidarPlan {
     LidarPlan {
-        model: &MODELS[0],
+        sensor: std::sync::Arc::new(Sensor::new("vlp16").unwrap()),
+        kick: None,
+        silent_s: Vec::new(),
         address: [192, 168, 1, 201 + index],
         port: 2368,
         position_m: Vector3::new(3.0, -7.0, z_m),
@@ -88,9 +92,11 @@ fn scene() -> ScenePlan {
             slope: [0.01, 0.0],
             roughness_m: 0.01,
             correlation_m: 0.8,
+            swell_m: 0.0,
         },
         wall: None,
         boxes: Vec::new(),
+        targets: Vec::new(),
         lidars: (0..)
             .zip(PLACES_M)
             .map(|(index, z_m)| lidar(index, z_m))
@@ -104,6 +110,9 @@ fn scene() -> ScenePlan {
             max_range_m: 100.0,
             grazing_rad: 1.5,
             incidence_bias_m: 0.0,
+            faint_bias_m: 0.0,
+            retro_bias_m: 0.0,
+            noise_freedom: 0,
         },
         network: NetworkPlan {
             loss: 0.004,
@@ -136,25 +145,29 @@ fn scan(bytes: &[u8]) -> ScanReport {
 }
 
 fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<Frame> {
-    let mut reader = DatagramReader::new(bytes).unwrap();
-    let mut sweeps = SweepReader::new(report, &SweepOptions::default()).unwrap();
-    let pass = PassThrough::new([-5.0, -4.0, 70.0], [12.0, 6.0, 111.0]).unwrap();
-    let first = START + PERIOD_NS;
-    let mut assembler = FrameAssembler::new(poses.to_vec(), pass, first, PERIOD_NS).unwrap();
-    let mut take = |sweeps: &mut SweepReader| {
-        while let Some(sweep) = sweeps.pop() {
-            assembler.push(&sweep);
-            sweeps.recycle(sweep.lidar, sweep.cloud);
-        }
+    let mut datagrams = DatagramReader::new(bytes).unwrap();
+    let plan = FramePlan {
+        lidars: (0..poses.len()).collect(),
+        poses: poses.to_vec(),
+        cut_azimuth_rad: vec![0.0; poses.len()],
+        pass: PassThrough::new([-5.0, -4.0, 70.0], [12.0, 6.0, 111.0]).unwrap(),
+        first: START + PERIOD_NS,
+        period_ns: PERIOD_NS,
+        start: START,
+        stop: Timestamp(i64::MAX),
     };
-    while let Some(datagram) = reader.next().unwrap() {
-        sweeps.push(&datagram);
-        take(&mut sweeps);
+    let mut reader = FrameReader::new(report, &plan).unwrap();
+    let mut batch = DatagramBatch::default();
+    while let Some(datagram) = datagrams.next().unwrap() {
+        batch.push(&datagram);
+        if batch.bytes() > 2 << 20 {
+            reader.push(&batch);
+            batch.clear();
+        }
     }
-    sweeps.finish();
-    take(&mut sweeps);
-    assembler.finish();
-    std::iter::from_fn(|| assembler.pop()).collect()
+    reader.push(&batch);
+    reader.finish();
+    std::iter::from_fn(|| reader.pop()).collect()
 }
 
 /// Step 6: the intervals of the distance over the whole test, what the first pass is for.
@@ -220,11 +233,11 @@ fn pipeline(c: &mut Criterion) {
     group.bench_function("the same, a radius per point", |b| {
         b.iter(|| sections(black_box(&assembled), &by_point));
     });
-    group.bench_function("whole, two passes", |b| {
+    group.bench_function("whole", |b| {
         b.iter(|| {
             let report = scan(black_box(&bytes));
-            let rule = rule(&frames(&bytes, &report, &poses), &poses);
-            sections(&frames(&bytes, &report, &poses), &params(&poses, rule))
+            let frames = frames(&bytes, &report, &poses);
+            sections(&frames, &params(&poses, rule(&frames, &poses)))
         });
     });
     group.finish();

@@ -141,6 +141,6 @@ def write(
     parts = {"deflection": frame, "steps": step_table(frame)} | more
     for name, part in parts.items():
         tables.write(part, folder / f"{name}.parquet", metadata)
-    (folder / "test.toml").write_text(config)
+    (folder / "test.toml").write_text(config, encoding="utf-8")
     (folder / "run.json").write_text(json.dumps(run_facts() if run is None else run))
     return folder

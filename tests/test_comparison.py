@@ -116,7 +116,7 @@ def at(frame: pl.DataFrame, step: str, section: str, source: str, quantity: str)
 def test_the_papers_table_2_comes_out_of_its_measurement(tmp_path: Path) -> None:
     folder = paper_folder(tmp_path / "results")
     found = comparison.compare(folder, theory(tmp_path / "theory.csv"))
-    with pytest.warns(ComparisonWarning, match="only wires of known anchor"):
+    with pytest.warns(ComparisonWarning, match="its line is not known"):
         wires = comparison.compare(folder, wire(tmp_path / "wire.csv"))
     text = comparison.table2(pl.concat([found, wires]))
     lines = [line.split() for line in text.splitlines()[3:6]]

@@ -10,7 +10,7 @@ from lidar_deflect.errors import CaptureError, InvalidValueError, OutputError
 from packets import puck, write_pcap
 
 COLUMNS = (
-    *("time", "lidar", "sweep", "packet", "block", "ring", "azimuth_deg", "range_m"),
+    *("time", "lidar", "sweep", "packet", "block", "frame_id", "ring", "azimuth_deg", "range_m"),
     *("x_m", "y_m", "z_m", "intensity", "return_index", "return_kind"),
 )
 
@@ -76,6 +76,8 @@ def test_npz_has_the_same_columns(
             expected = frame[name].cast(pl.String) if name == "return_kind" else frame[name]
             if name == "time":
                 np.testing.assert_array_equal(pack[name].astype(int), expected.to_physical())
+            elif name == "frame_id":
+                assert np.isnan(pack[name]).all()
             else:
                 np.testing.assert_array_equal(pack[name], expected.to_numpy())
 

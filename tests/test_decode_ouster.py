@@ -79,4 +79,4 @@ def test_packets_of_accelerations_are_not_foreign() -> None:
     opened = capture.open(path)
     assert dict(opened.drops) == {"companion": 10}
     (stream,) = opened.streams
-    assert (stream.model, stream.packets, stream.lost) == ("os2", 64, 0)
+    assert (stream.model, stream.packets, stream.lost) == ("os2-128", 64, 0)

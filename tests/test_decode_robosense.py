@@ -21,8 +21,8 @@ def present() -> None:
         pytest.skip("the captures are not beside the project")
 
 
-def test_a_helios_16p_decodes_to_the_reference() -> None:
-    opened = capture.open(CAPTURE, sensors={"192.168.1.201": "helios-16p"})
+def test_without_an_option_it_decodes_to_the_reference() -> None:
+    opened = capture.open(CAPTURE)
     sweeps = list(opened.sweeps())
     found = {name: np.concatenate([getattr(s, name) for s in sweeps]) for name in NAMES}
     with np.load(CAPTURE.with_suffix(".ref.npz")) as file:
@@ -42,11 +42,18 @@ def test_a_helios_16p_decodes_to_the_reference() -> None:
     assert np.ptp(times) < 2e-6
 
 
-def test_its_content_is_that_of_32_lasers() -> None:
-    # The unit tells 32 angles and sends twice as fast as a Helios 16P; so it is not taken for one.
+def test_what_speaks_for_another_model_is_said() -> None:
+    # The header names no model, the unit tells 32 angles and sends twice as fast as a Helios 16P.
     (stream,) = capture.open(CAPTURE).streams
-    assert stream.model == "helios-32"
+    assert (stream.model, stream.candidates) == ("helios16p", ("helios32",))
     assert stream.rpm == pytest.approx(600, abs=1)
     assert (stream.packets, stream.lost, stream.return_mode) == (375, 0, "strongest")
-    assert any("helios-16p" in note and "--sensor" in note for note in stream.notes)
+    assert any("--sensor SOURCE=helios32" in note for note in stream.notes)
+    assert any("describes 32 lasers" in note for note in stream.notes)
     assert stream.beams == "packets to port 7788"
+
+
+def test_the_other_model_is_taken_when_it_is_named() -> None:
+    (stream,) = capture.open(CAPTURE, sensors={"192.168.1.201": "helios-32"}).streams
+    assert (stream.model, stream.candidates) == ("helios32", ())
+    assert not any("--sensor" in note for note in stream.notes)

@@ -89,7 +89,21 @@ def test_long_series_are_thinned() -> None:
     frame = folders.deflection(folders.TIP)
     many = pl.concat([frame.with_columns(pl.col("t_s") + 20.0 * k) for k in range(100)])
     figure = Plots(Result(many, folders.step_table(frame))).time_series()
-    assert 3000 < len(figure.data[0].x) <= 6000
+    assert 500 < len(figure.data[0].x) <= 6000
+
+
+def test_thinning_keeps_every_peak_and_every_gap() -> None:
+    frame = folders.deflection(folders.TIP, overhead_s=None)
+    many = pl.concat([frame.with_columns(pl.col("t_s") + 20.0 * k) for k in range(100)])
+    peak = many.with_row_index().with_columns(
+        dx_m=pl.when(pl.col("index") == 12_345).then(99.0).otherwise(pl.col("dx_m")),
+        dz_m=pl.when(pl.col("index") == 7_654).then(None).otherwise(pl.col("dz_m")),
+    )
+    thin = style.thinned(peak, ["dx_m", "dy_m", "dz_m"], 600)
+    assert thin.height < 800
+    assert thin["dx_m"].max() == 99.0
+    assert thin["dz_m"].null_count() == 1
+    assert thin["t_s"].is_sorted()
 
 
 def compared(*rows: tuple[str, str, str, float, float]) -> pl.DataFrame:
@@ -124,11 +138,14 @@ def test_without_a_trusted_reference_lidar_is_drawn_against_each_source() -> Non
     ]
 
 
-def test_load_deflection_has_a_line_and_its_holds_per_section() -> None:
+def test_load_deflection_has_path_line_and_holds_per_section() -> None:
     figure = Plots(result(folders.deflection(u_m=0.01))).load_deflection()
-    assert len(figure.data) == 2 * 3
+    # path and line above, path and holds below, holds above
+    assert len(figure.data) == 5 * 3
     assert list(figure.data[-1].x) == pytest.approx([0.0, 40.0, 100.0])
     assert figure.data[-1].error_y.array[0] == pytest.approx(0.0196)
+    # the invented blade is linear: its holds lie on the line
+    assert np.max(np.abs(np.array(figure.data[-2].y, dtype=float))) < 0.3
 
 
 def test_shapes_are_drawn_from_the_blade_line_where_there_is_one() -> None:
@@ -148,6 +165,21 @@ def test_shapes_are_drawn_from_the_blade_line_where_there_is_one() -> None:
     assert len(Plots(own).deflected_shapes().data[0].x) == 50
 
 
+def test_rotations_that_a_method_did_not_write_are_those_of_its_line() -> None:
+    import beam_folders
+    from lidar_deflect.plots import spans
+
+    frame = beam_folders.deflection()
+    steps = folders.step_table(frame)
+    line = beam_folders.contour(frame)
+    bare = line.with_columns(rx_rad=pl.lit(None, pl.Float64), ry_rad=pl.lit(None, pl.Float64))
+    found = spans.sloped(bare, steps).sort("time", "s_m")
+    true = line.sort("time", "s_m")["ry_rad"].to_numpy()
+    # the line bends by 0.11 rad at most; differences of stations 2 m apart are good to 0.5 mrad
+    assert np.max(np.abs(found["ry_rad"].to_numpy() - true)) < 1.5e-3
+    assert spans.sloped(line, steps) is line
+
+
 def test_health_shows_loss_in_percent_of_what_was_due() -> None:
     figure = Plots(result()).health()
     lost = trace(figure, "L2")
@@ -165,7 +197,22 @@ def test_the_plan_shows_lidars_and_anchors_where_they_are_known() -> None:
     assert list(trace(figure, "wire anchor").text) == ["W84"]
 
 
-DRAWN = ("time_series", "load_deflection", "deflected_shapes", "plan", "comparison", "health")
+DRAWN = (
+    "time_series",
+    "wires",
+    "channels",
+    "load_deflection",
+    "creep",
+    "deflected_shapes",
+    "rotation",
+    "plan",
+    "pose_uncertainty",
+    "drift",
+    "residuals",
+    "comparison",
+    "health",
+    "cycles",
+)
 
 
 @pytest.mark.parametrize("name", DRAWN)

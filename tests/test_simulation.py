@@ -100,10 +100,10 @@ def test_sections_are_rigid_and_the_middle_is_half_way(folder: Path) -> None:
 
 def test_the_axis_between_sections_keeps_its_length() -> None:
     """Chords between sections 1 m apart are shorter than the arc by (curvature)^2 / 24 only."""
-    from lidar_deflect import _native, simulation
+    from lidar_deflect import _native, scene_plan
 
     scene = small(sections_m=[float(s) for s in range(20, 111)])
-    document = simulation._plan(scene)
+    document = scene_plan.plan(scene)
     document["levels"] = [0.0, 1.0]
     native = _native.Simulation(document)
     rows = native.truth(scene.sections_m, np.array([0.0, 0.9]), threads=1)
@@ -117,9 +117,9 @@ def test_the_axis_between_sections_keeps_its_length() -> None:
 
 def test_the_load_moves_the_tip_as_promised() -> None:
     scene = demo()
-    from lidar_deflect import _native, simulation
+    from lidar_deflect import _native, scene_plan
 
-    native = _native.Simulation(simulation._plan(scene))
+    native = _native.Simulation(scene_plan.plan(scene))
     held = np.array([1.0, 3 * (scene.loading.hold_s + scene.loading.ramp_s) + 2.0])
     rows = native.truth([110.0], held, threads=1)
     assert native.load(held).tolist() == [0.0, 1.0]

@@ -9,6 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "BeamAdjustment",
+    "BeamBlade",
+    "BeamSeen",
     "CaptureScan",
     "ContourCurves",
     "ContourPass",
@@ -23,6 +26,7 @@ __all__ = [
     "__version__",
     "adjust_network",
     "arc_length",
+    "beam_seen",
     "check_captures",
     "curve_distances",
     "curve_points",
@@ -47,8 +51,10 @@ __all__ = [
     "rotation_onto",
     "scan_capture",
     "scan_quickly",
+    "sensor_id",
     "sensor_models",
     "sensor_table",
+    "simulated_sensors",
     "walk_arc",
     "yaw_from_wall",
 ]
@@ -79,6 +85,7 @@ def scan_quickly(
     units: Sequence[tuple[str | None, str, bytes, bool]],
     head_s: float,
 ) -> tuple[CaptureScan, list[tuple[str, int]]]: ...
+def sensor_id(name: str) -> str | None: ...
 def sensor_models() -> list[tuple[str, str]]: ...
 def sensor_table() -> list[list[str]]: ...
 
@@ -169,6 +176,7 @@ class SweepIterator(Iterator[Sweep]):
     def merged(self) -> int: ...
 
 def reference_blades() -> list[str]: ...
+def simulated_sensors() -> list[str]: ...
 
 @final
 class Simulation:
@@ -183,11 +191,15 @@ class Simulation:
     def advance(self, *, threads: int | None) -> bool: ...
     def packets(self) -> list[tuple[int, int]]: ...
     def poses(self) -> list[list[list[float]]]: ...
+    def last_poses(self) -> list[list[list[float]]]: ...
+    def range_offsets_m(self) -> list[list[float]]: ...
+    def units(self) -> list[tuple[str, list[tuple[str, bytes]]]]: ...
     def truth(
         self, sections_m: Sequence[float], times_s: NDArray[np.float64], *, threads: int | None
     ) -> NDArray[np.float64]: ...
     def load(self, times_s: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def ground_m(self, places: Sequence[tuple[float, float]]) -> list[float]: ...
+    def wall_m(self, places: Sequence[tuple[float, float]]) -> list[float]: ...
     def nominal(self) -> dict[str, NDArray[np.float64]]: ...
     def contours(self) -> NDArray[np.float64]: ...
 
@@ -257,7 +269,13 @@ class DistancePass:
 @final
 class ContourPass:
     def __new__(
-        cls, plan: FramePlan, params: FrameParams, *, sample_every: int, sample_points: int
+        cls,
+        plan: FramePlan,
+        params: FrameParams,
+        first_pass: DistancePass,
+        *,
+        sample_every: int,
+        sample_points: int,
     ) -> ContourPass: ...
     def advance(
         self,
@@ -356,6 +374,85 @@ class ContourCurves:
     def before_m(self, tip_z_m: float, length_m: float) -> list[float]: ...
 
 @final
+class BeamBlade:
+    def __new__(
+        cls,
+        stations: NDArray[np.float64],
+        outline_s_m: Sequence[float],
+        outlines: NDArray[np.float64],
+        *,
+        leading_edge: NDArray[np.float64],
+        suction_side: NDArray[np.float64],
+        saddles_s_m: Sequence[float],
+    ) -> BeamBlade: ...
+    def forces_for(
+        self,
+        direction: NDArray[np.float64],
+        s_m: Sequence[float],
+        deflection_m: Sequence[float],
+    ) -> NDArray[np.float64] | None: ...
+
+@final
+class BeamSeen:
+    def __len__(self) -> int: ...
+
+def beam_seen(
+    scan: CaptureScan,
+    *,
+    lidars: Sequence[int],
+    poses: NDArray[np.float64],
+    cut_azimuth_deg: Sequence[float],
+    box_m: NDArray[np.float64],
+    windows_ns: Sequence[tuple[int, int]],
+    progress: Callable[[int, int], None] | None = None,
+) -> list[BeamSeen]: ...
+
+@final
+class BeamAdjustment:
+    def __new__(
+        cls,
+        blade: BeamBlade,
+        seen: Sequence[BeamSeen],
+        *,
+        spans_ns: Sequence[tuple[int, int]],
+        forces_n: NDArray[np.float64],
+        full_n: NDArray[np.float64],
+        poses: NDArray[np.float64],
+        channels: Sequence[int],
+        rig_prior: NDArray[np.float64],
+        rig_covariance: NDArray[np.float64],
+        from_m: float,
+        trust: Sequence[float],
+        shape_trust: Sequence[float],
+        noise_m: float,
+        surface_m: float,
+        edge_rad: float,
+        echoes: int,
+        threads: int | None = None,
+    ) -> BeamAdjustment: ...
+    def linearise(self) -> None: ...
+    def step(self, echo_m: float, edge_m: float, stage: str) -> dict[str, Any]: ...
+    def sections(
+        self, s_m: Sequence[float], echo_m: float, edge_m: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def states(
+        self, hold: int, s_m: Sequence[float], times_ns: Sequence[int]
+    ) -> NDArray[np.float64]: ...
+    @staticmethod
+    def load_knots(span_ns: tuple[int, int]) -> list[int]: ...
+    def follow(
+        self,
+        seen: Sequence[BeamSeen],
+        spans_ns: Sequence[tuple[int, int]],
+        loads: Sequence[Sequence[float]],
+        times_ns: Sequence[Sequence[int]],
+        s_m: Sequence[float],
+        hold_loads: Sequence[float],
+        gates: Sequence[tuple[float, float]],
+    ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]] | None]: ...
+    def values(self) -> NDArray[np.float64]: ...
+    def layout(self) -> dict[str, int]: ...
+
 class StaticHold:
     """What one lidar sees while nothing moves: mean rays per channel and azimuth cell."""
 

@@ -12,6 +12,7 @@ import tomlkit
 
 from lidar_deflect.errors import CalibrationError
 from lidar_deflect.files import whole_file, write_text
+from lidar_deflect.notebook import card
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -155,7 +156,14 @@ class Calibration:
         return f"Calibration({self.method}: {names}; {len(self.warnings)} warnings)"
 
     def _repr_html_(self) -> str:
-        return f"<pre>{self.summary()}</pre>"
+        """Return where every lidar stands, and how well that is known."""
+        head = ("lidar", "x (m)", "y (m)", "z (m)", "U shift (mm)", "U turn (mrad)")
+        rows = [
+            (pose.id, *map(float, pose.position_m), *_expanded(pose.covariance))
+            for pose in self.poses
+        ]
+        note = "; ".join(self.warnings) or "U: largest expanded uncertainty (k = 2) of an axis"
+        return card(repr(self), head, rows, note)
 
     def pose(self, id: str) -> Pose:
         """Return the pose of one lidar.
@@ -235,6 +243,14 @@ class Calibration:
             joint,
             document.get("evidence", {}),
         )
+
+
+def _expanded(covariance: NDArray[np.float64] | None) -> tuple[float | None, float | None]:
+    """Largest expanded uncertainty (k = 2) of shift, mm, and turn, mrad, about any axis."""
+    if covariance is None:
+        return None, None
+    sigma = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return 2e3 * float(sigma[3:].max()), 2e3 * float(sigma[:3].max())
 
 
 def _pose_to_dict(pose: Pose) -> dict[str, Any]:

@@ -1,7 +1,9 @@
 """Captures: open them, tell what they hold, iterate over the sweeps of their lidars."""
 
-import html
 import math
+import shutil
+import tempfile
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from lidar_deflect import _native, units
+from lidar_deflect import _native, bags, units
 from lidar_deflect._native import Sweep, SweepIterator
-from lidar_deflect.errors import InvalidValueError
+from lidar_deflect.errors import CaptureError, InvalidValueError
+from lidar_deflect.notebook import card
 from lidar_deflect.streams import StreamInfo, no_lidar, same_address, stream, utc
 
 __all__ = ["RETURN_KINDS", "Capture", "StreamInfo", "Sweep", "Sweeps", "open", "sensor_models"]
@@ -44,8 +47,9 @@ class _Found:
 class Sweeps(Iterator[Sweep]):
     """Sweeps as they complete; what `Capture.sweeps` returns."""
 
-    def __init__(self, native: SweepIterator) -> None:
+    def __init__(self, native: SweepIterator, capture: "Capture") -> None:
         self._native = native
+        self._capture = capture  # its temporary files stay as long as they are read
 
     def __next__(self) -> Sweep:
         return next(self._native)
@@ -74,6 +78,8 @@ class Capture:
         self._sensors = dict(sensors)
         self._ids = dict(ids)
         self._found: _Found | None = None
+        self._bags = tuple(path for path in self.paths if bags.kind_of(path))
+        self._unpacked: bags.Unpacked | None = None
 
     def scan(self, progress: Progress | None = None) -> None:
         """Read the files once, if that was not done yet; everything else does so by itself.
@@ -84,18 +90,68 @@ class Capture:
             If there is no lidar in them (``capture.no_lidar``), or a file is no capture.
         """
         if self._found is None:
-            named = list(self._sensors.items())
-            scan = _native.scan_capture(
-                self.paths, sensors=named, units=self._units, progress=progress
-            )
+            self._unpack(progress)
+            scan = _native.scan_capture(self._files(), **self._known(), progress=progress)
             self._found = self._judge(scan)
+
+    def _unpack(self, progress: Progress | None, head_s: float | None = None) -> None:
+        """Write what bags hold as captures, which go with this object."""
+        if not self._bags:
+            return
+        folder = Path(tempfile.mkdtemp(prefix="lidar-deflect-", dir=units.scratch()))
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
+        self._unpacked = bags.unpack(self._bags, folder, head_s=head_s, progress=progress)
+
+    def _files(self) -> list[Path]:
+        """Files that the compiled core reads."""
+        plain = [path for path in self.paths if path not in self._bags]
+        return plain + list(self._unpacked.paths if self._unpacked else ())
+
+    def _known(self) -> dict[str, Any]:
+        """Models and files of units, with topics as the addresses that stand for them."""
+        topics = self._unpacked.topics if self._unpacked else bags.Topics()
+        sensors = [(topics.source(source), model) for source, model in self._sensors.items()]
+        files = [
+            (source and topics.source(source), *rest)
+            for source, *rest in self._units
+            if not source or topics.source(source)
+        ]
+        recorded = self._unpacked.units if self._unpacked else ()
+        return {
+            "sensors": [(source, model) for source, model in sensors if source],
+            "units": [*files, *recorded],
+        }
+
+    def reopened(self, path: Path) -> "Capture":
+        """Open a piece of this capture with what is known of its units."""
+        known = self._known()
+        return Capture([path], dict(known["sensors"]), {}, known["units"])
 
     def _judge(self, scan: _native.CaptureScan) -> "_Found":
         described = scan.describe()
+        keys = [entry["lidar"] for entry in described["streams"]]
+        if self._unpacked is not None:
+            described = self._in_topics(described)
         if not described["streams"]:
             raise no_lidar(self.paths, described, sensor_models())
-        found = tuple(stream(entry) for entry in described["streams"])
+        pairs = zip(keys, described["streams"], strict=True)
+        found = tuple(stream(entry | {"key": key}) for key, entry in pairs)
         return _Found(scan, _named(found, self._ids), described)
+
+    def _in_topics(self, described: dict[str, Any]) -> dict[str, Any]:
+        """Tell of bags and topics instead of the captures that were made of them."""
+        assert self._unpacked is not None
+        told: dict[str, Any] = self._unpacked.topics.told(described)
+        for entry in told["streams"]:
+            if entry["source"].startswith("/"):
+                notes = self._unpacked.notes.get(entry["source"], ())
+                entry |= {"port": None, "notes": [*entry["notes"], *notes]}
+        plain = [entry for entry in told["captures"] if Path(entry["path"]) in self.paths]
+        drops = {pair["reason"]: pair["count"] for pair in told["drops"]}
+        for reason, count in self._unpacked.drops.items():
+            drops[reason] = drops.get(reason, 0) + count
+        listed = [{"reason": reason, "count": count} for reason, count in sorted(drops.items())]
+        return told | {"captures": [*plain, *self._unpacked.captures], "drops": listed}
 
     @property
     def _findings(self) -> "_Found":
@@ -160,17 +216,17 @@ class Capture:
         if quick and self._found is None:
             return self._quick_info()
         self.scan(progress)
-        return _document(self._findings, {s.address: s.last_ns for s in self.streams}, quick=False)
+        return _document(self._findings, {s.key: s.last_ns for s in self.streams}, quick=False)
 
     def _quick_info(self) -> dict[str, Any]:
-        named = list(self._sensors.items())
-        scan, ends = _native.scan_quickly(
-            self.paths, sensors=named, units=self._units, head_s=QUICK_HEAD_S
-        )
+        self._unpack(None, QUICK_HEAD_S)
+        scan, ends = _native.scan_quickly(self._files(), **self._known(), head_s=QUICK_HEAD_S)
         last_ns: dict[str, int] = {}
-        for address, end_ns in ends:
-            last_ns[address] = max(end_ns, last_ns.get(address, end_ns))
-        return _document(self._judge(scan), last_ns, quick=True)
+        for key, end_ns in ends if not self._bags else ():  # of bags only the head was unpacked
+            last_ns[key] = max(end_ns, last_ns.get(key, end_ns))
+        document = _document(self._judge(scan), last_ns, quick=True)
+        self._unpacked = None
+        return document
 
     def health(self) -> dict[str, NDArray[Any]]:
         """Count what arrived per second and lidar.
@@ -183,8 +239,8 @@ class Capture:
             ``points``, ``rpm`` and ``clock_offset_s`` (NaN where nothing arrived), ``coverage``.
         """
         columns = self.native.health()
-        names = {stream.address: stream.lidar for stream in self.streams}
-        columns["lidar"] = np.array([names[address] for address in columns["lidar"]], dtype=str)
+        names = {stream.key: stream.lidar for stream in self.streams}
+        columns["lidar"] = np.array([names[key] for key in columns["lidar"]], dtype=str)
         kept = np.isin(columns["lidar"], self.lidars)
         return {name: np.asarray(column)[kept] for name, column in columns.items()}
 
@@ -235,7 +291,7 @@ class Capture:
             stop_ns=self.instant_ns(stop_s),
             progress=progress,
         )
-        return Sweeps(native)
+        return Sweeps(native, self)
 
     def numbers(self, lidar: str | Sequence[str] | None = None) -> list[int]:
         """Numbers in `streams` of lidars by name; all those of `lidars` for None.
@@ -287,7 +343,7 @@ class Capture:
                 s.lidar,
                 s.title,
                 s.return_mode,
-                f"{s.rpm:.0f}",
+                "-" if s.rpm is None else f"{s.rpm:.0f}",
                 s.packets,
                 s.lost,
                 s.late,
@@ -295,10 +351,7 @@ class Capture:
             )
             for s in self.streams
         ]
-        head = "".join(f"<th>{name}</th>" for name in header)
-        cells = ("".join(f"<td>{html.escape(str(cell))}</td>" for cell in row) for row in rows)
-        body = "".join(f"<tr>{row}</tr>" for row in cells)
-        return f"<p>{html.escape(repr(self))}</p><table><tr>{head}</tr>{body}</table>"
+        return card(repr(self), header, rows)
 
 
 def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
@@ -313,7 +366,9 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     Parameters
     ----------
     path
-        pcap or pcapng, plain, gzip or zstd; one file, or many: rotated, or one per lidar.
+        pcap or pcapng, plain, gzip or zstd, or ROS bags (``.bag``, ``.db3``, ``.mcap``, the folder
+        of a ROS 2 bag; extra ``ros``), whose lidars are named by their topics; one file, or many:
+        rotated, or one per lidar.
     config
         A `Test` or `Config`, whose lidars then give names and models.
     sensors
@@ -333,14 +388,17 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
         If a file is not there.
     CaptureError
         If a file is no capture.
+    MissingExtraError
+        If a bag is given and the extra ``ros`` is not installed.
     InvalidValueError
         If a model is not known, or a file of a unit cannot be read (``beams.unreadable``).
         Later, when the capture is read: if a file is of no lidar of the capture
         (``beams.not_taken``), is broken (``beams.malformed``), or a model gives no points without
         one (``beams.missing``).
     """
-    paths = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
-    _native.check_captures(paths)
+    given = [Path(path)] if isinstance(path, str | Path) else [Path(one) for one in path]
+    paths = [file for one in given for file in bags.located(one)]
+    _check(paths)
     lidars = _lidars_of(config)
     own = {lidar.source or "": files for lidar in lidars if (files := getattr(lidar, "beams", ()))}
     files = units.named(own | dict(beams or {})) + units.beside(paths)
@@ -349,12 +407,30 @@ def open(  # noqa: A001 - `lidar_deflect.open` is the name that users know
     named = {source: model for source, model in named.items() if model != "auto"}
     known = dict(sensor_models())
     for model in (named | dict(sensors or {})).values():
-        if model not in known:
+        if _native.sensor_id(model) is None:
             raise InvalidValueError(
                 f"sensor model: expected one of {', '.join(known)}, found {model!r}",
                 code="sensor.unknown",
             )
     return Capture(paths, named | dict(sensors or {}), ids, files)
+
+
+def _check(paths: Sequence[Path]) -> None:
+    """Look at the heads of all files, so that what is no capture is told at once."""
+    bagged = [path for path in paths if bags.kind_of(path)]
+    if len(set(bagged)) < len(bagged):
+        raise CaptureError(
+            "a bag was given twice",
+            code="capture.given_twice",
+            hint="name every file once, or its packets would count twice",
+        )
+    plain = [path for path in paths if path not in bagged]
+    if bagged:
+        bags.require(bagged)
+        with tempfile.TemporaryDirectory() as folder:
+            bags.looks(bagged, Path(folder))
+    if plain or not bagged:
+        _native.check_captures(plain)
 
 
 def sensor_models() -> tuple[tuple[str, str], ...]:
@@ -369,9 +445,9 @@ def _lidars_of(config: Any) -> Sequence[Any]:
 
 
 def _document(found: _Found, last_ns: Mapping[str, int], *, quick: bool) -> dict[str, Any]:
-    """Make the document of ``info --json``; `last_ns` goes by address."""
+    """Make the document of ``info --json``; `last_ns` goes by key."""
     described = found.described
-    ends = [last_ns.get(stream.address) for stream in found.streams]
+    ends = [last_ns.get(stream.key) for stream in found.streams]
     known = [end for end in ends if end is not None]
     return {
         "schema": INFO_SCHEMA,

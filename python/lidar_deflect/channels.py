@@ -33,7 +33,7 @@ class Channel:
     value
         Readings, shape (n,), NaN where there is none.
     unit
-        ``percent``, ``m`` or ``rad``.
+        ``percent``, ``m`` or ``rad``; of other instruments as configured.
     """
 
     name: str
@@ -64,7 +64,12 @@ class Channel:
 
 
 def read_load(
-    path: str | Path, *, time: str = "time_utc_s", value: str, unit: str = "percent"
+    path: str | Path,
+    *,
+    time: str = "time_utc_s",
+    value: str,
+    unit: str = "percent",
+    near_ns: int | None = None,
 ) -> Channel:
     """Read a load channel in percent.
 
@@ -73,11 +78,13 @@ def read_load(
     Parameters
     ----------
     path
-        CSV or parquet file.
+        File of any format of `lidar_deflect.laboratory`.
     time, value
         Columns of the instants (UTC) and of the load.
     unit
         ``percent``, ``fraction``, or one of `FORCE`.
+    near_ns
+        Start of the test: dates times of day.
 
     Raises
     ------
@@ -86,11 +93,9 @@ def read_load(
     InvalidValueError
         If the unit is unknown.
     """
-    frame = delimited.read(path)
-    times, values = (
-        delimited.instants(frame, time, path),
-        delimited.numbers(frame, value, path),
-    )
+    frame = delimited.read(path, [value, time])
+    times = delimited.instants(frame, time, path, near_ns)
+    values = delimited.numbers(frame, value, path)
     if unit in FORCE:
         return Channel("load", times, holds.percent_of_highest_hold(times, values), "percent")
     factor = _factor(unit, PERCENT, "load", [*PERCENT, *FORCE])
@@ -105,13 +110,14 @@ def read_wire(
     time: str = "time_utc_s",
     unit: str = "mm",
     negate: bool = False,
+    near_ns: int | None = None,
 ) -> Channel:
     """Read a draw wire in metres, positive where the distance to its anchor became shorter.
 
     Parameters
     ----------
     path
-        CSV or parquet file.
+        File of any format of `lidar_deflect.laboratory`.
     name
         Name of the wire, which the channel takes.
     column, time
@@ -120,11 +126,13 @@ def read_wire(
         ``mm``, ``cm`` or ``m``.
     negate
         True where the reading grows with the distance.
+    near_ns
+        Start of the test: dates times of day.
     """
-    frame = delimited.read(path)
+    frame = delimited.read(path, [column, time])
     factor = _factor(unit, METRES, f"wire {name}") * (-1.0 if negate else 1.0)
     values = delimited.numbers(frame, column, path) * factor
-    return Channel(name, delimited.instants(frame, time, path), values, "m")
+    return Channel(name, delimited.instants(frame, time, path, near_ns), values, "m")
 
 
 def read_root(
@@ -135,17 +143,33 @@ def read_root(
     ry: str | None = None,
     rz: str | None = None,
     unit: str = "mrad",
+    near_ns: int | None = None,
 ) -> tuple[Channel, ...]:
     """Read the measured rotation of root or stand, one channel in radians per column named."""
-    frame = delimited.read(path)
+    frame = delimited.read(path, [time, *(name for name in (rx, ry, rz) if name is not None)])
     factor = _factor(unit, RADIANS, "root")
-    times = delimited.instants(frame, time, path)
+    times = delimited.instants(frame, time, path, near_ns)
     named = {"root_rx": rx, "root_ry": ry, "root_rz": rz}
     return tuple(
         Channel(name, times, delimited.numbers(frame, column, path) * factor, "rad")
         for name, column in named.items()
         if column is not None
     )
+
+
+def read_other(
+    path: str | Path,
+    *,
+    name: str,
+    column: str,
+    time: str = "time_utc_s",
+    unit: str = "",
+    near_ns: int | None = None,
+) -> Channel:
+    """Read any other instrument as it is; its unit is only shown."""
+    frame = delimited.read(path, [column, time])
+    values = delimited.numbers(frame, column, path)
+    return Channel(name, delimited.instants(frame, time, path, near_ns), values, unit)
 
 
 Quantity = Literal["total", "direction", "vector"]
@@ -199,7 +223,7 @@ def read_prediction(
     Parameters
     ----------
     path
-        CSV or parquet file.
+        File of any format of `lidar_deflect.laboratory`.
     section
         Column of the arc length in metres.
     value
@@ -230,7 +254,7 @@ def read_truth(path: str | Path) -> pl.DataFrame:
     Parameters
     ----------
     path
-        CSV or parquet file with the columns ``time`` (instants, the same for every section),
+        File with the columns ``time`` (instants, the same for every section),
         ``s_m``, and ``x_m``, ``y_m``, ``z_m`` of the mid-chord point in the world frame.
     """
     frame = delimited.read(path)

@@ -91,10 +91,10 @@ def _poses(config: Config) -> Iterator[Finding]:
 
 
 def _channels(config: Config, capture: Capture) -> Iterator[Finding]:
-    load = instruments.load(config)
-    instruments.prediction(config)
-    read: Sequence[Channel] = [*([load] if load else []), *instruments.wires(config)]
     first, last = capture.first_time_ns, capture.last_time_ns
+    load = instruments.load(config, first)
+    instruments.prediction(config)
+    read: Sequence[Channel] = [*([load] if load else []), *instruments.wires(config, first)]
     for channel in read:
         if channel.time_ns[-1] < first or channel.time_ns[0] > last:
             apart_s = max(first - channel.time_ns[-1], channel.time_ns[0] - last) * 1e-9

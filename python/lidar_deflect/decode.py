@@ -1,4 +1,4 @@
-"""Points of a capture as files: parquet, csv, npz, ply, pcd, or a shorter capture.
+"""Points of a capture as files: parquet, csv, npz, las, laz, ply, pcd, or a shorter capture.
 
 Everything is streamed: memory does not grow with the capture. Files get their name when they are
 complete.
@@ -19,6 +19,7 @@ from lidar_deflect import capture as captures
 from lidar_deflect.capture import RETURN_KINDS, Capture
 from lidar_deflect.errors import CaptureError, InvalidValueError
 from lidar_deflect.files import whole_file
+from lidar_deflect.lasfiles import LasFile, LazFile
 from lidar_deflect.pointfiles import PLAIN, Block, NpzFile, PcdFile, PlyFile, PointFile
 
 if TYPE_CHECKING:
@@ -50,8 +51,8 @@ def decode(
     capture
         What `capture.open` returned.
     out
-        File to write; its suffix says what: ``.parquet``, ``.csv``, ``.npz``, ``.ply``, ``.pcd``,
-        or ``.pcap`` for the packets themselves.
+        File to write; its suffix says what: ``.parquet``, ``.csv``, ``.npz``, ``.las``, ``.laz``
+        (extra ``points``), ``.ply``, ``.pcd``, or ``.pcap`` for the packets themselves.
     lidars
         Names of the lidars; default all.
     start_s, stop_s
@@ -78,6 +79,8 @@ def decode(
         If no point lies in the span (``capture.no_points``).
     OutputError
         If the file exists or cannot be written; nothing is left behind.
+    MissingExtraError
+        If ``.las`` or ``.laz`` is asked for and the extra ``points`` is not installed.
     """
     del threads
     path = Path(out)
@@ -129,7 +132,7 @@ def _cut(
 ) -> dict[str, Any]:
     _native.cut_capture(capture.native, path, lidars=numbers, progress=progress, **span)
     try:
-        cut = captures.open(path, sensors=capture.sensors)
+        cut = capture.reopened(path)
         points, merged = (
             sum(getattr(s, name) for s in cut.streams) for name in ("points", "merged")
         )
@@ -164,6 +167,7 @@ class _TableFile(PointFile):
         from lidar_deflect import tables
 
         x, y, z = np.ascontiguousarray(block["xyz"].T)
+        frames = pl.Series(block["frame_id"]).set(pl.Series(~block["has_frame_id"]), None)
         kinds = pl.Series(self.kinds, dtype=pl.Enum(tables.RETURN_KINDS))
         self.points += len(x)
         return tables.build(
@@ -172,7 +176,7 @@ class _TableFile(PointFile):
                 "time": block["time_ns"],
                 "lidar": pl.Series(self.lidars, dtype=pl.String).gather(block["lidar"]),
                 **{name: block[name] for name in PLAIN},
-                "frame_id": None,
+                "frame_id": frames,
                 "x_m": x,
                 "y_m": y,
                 "z_m": z,
@@ -285,6 +289,8 @@ FILES: dict[str, type[PointFile]] = {
     ".parquet": ParquetFile,
     ".csv": CsvFile,
     ".npz": NpzFile,
+    ".las": LasFile,
+    ".laz": LazFile,
     ".ply": PlyFile,
     ".pcd": PcdFile,
 }

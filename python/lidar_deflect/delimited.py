@@ -1,14 +1,16 @@
-"""Columns out of files as laboratories write them: CSV with commas, semicolons or tabs, parquet."""
+"""Columns out of files as laboratories write them: numbers and instants, however spelled."""
 
-import io
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import polars as pl
 
-from lidar_deflect.errors import ConfigError, ConfigNotFoundError
+from lidar_deflect import laboratory
+from lidar_deflect.errors import ConfigError
+from lidar_deflect.laboratory import clock
 from lidar_deflect.tables import nearest_hint
 
 _MISSING = ("", "nan", "null", "none", "n/a", "na", "-")
@@ -16,55 +18,28 @@ _DECIMAL_COMMA = r"^\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$"
 _UTC_SECONDS = (1e8, 1e11)  # 1973 to 5138: neither seconds since a start nor milliseconds
 
 
-def read(path: str | Path) -> pl.DataFrame:
-    """Read a CSV file (all columns as text) or a parquet file.
-
-    Lines that begin with ``#`` are skipped; the separator is the most frequent of semicolon, tab
-    and comma in the header.
+def read(path: str | Path, holding: Sequence[str] = ()) -> pl.DataFrame:
+    """Read one table of a file of any known format, see `lidar_deflect.laboratory`.
 
     Raises
     ------
     ConfigNotFoundError
         If there is no such file.
     ConfigError
-        If it can be read as neither.
+        If it can be read as none.
+    MissingExtraError
+        If its format needs the extra ``daq``.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise ConfigNotFoundError(f"there is no file {path}")
-    try:
-        content = path.read_bytes()
-        if content[:4] == b"PAR1":
-            return pl.read_parquet(io.BytesIO(content))
-        return _read_text(_decode(content))
-    except (OSError, pl.exceptions.PolarsError) as error:
-        raise ConfigError(
-            f"{path} can be read neither as CSV nor as parquet",
-            code="config.channel",
-            facts=[("because", str(error).splitlines()[0])],
-        ) from error
-
-
-def _decode(content: bytes) -> str:
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        return content.decode("latin-1")  # what is left in laboratories; numbers are the same
-
-
-def _read_text(text: str) -> pl.DataFrame:
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    header = lines[0] if lines else ""
-    separator = max(";\t,", key=header.count)
-    source = "\n".join(lines).encode()
-    frame = pl.read_csv(io.BytesIO(source), separator=separator, infer_schema=False)
-    return frame.rename({name: name.strip() for name in frame.columns})
+    return laboratory.read(path, holding)
 
 
 def column(frame: pl.DataFrame, name: str, path: str | Path) -> pl.Series:
     """Return the column `name`; `ConfigError` names the nearest when there is none."""
     if name in frame.columns:
         return frame[name]
+    parts = [part.strip() for part in name.split("+")]
+    if len(parts) == 2 and set(parts) <= set(frame.columns):  # date and time apart
+        return frame.select(pl.concat_str(parts, separator=" ").alias(name)).to_series()
     raise ConfigError(
         f"{path} has no column {name!r}",
         code="config.column",
@@ -118,10 +93,19 @@ def _bad_value(
     )
 
 
-def instants(frame: pl.DataFrame, name: str, path: str | Path) -> npt.NDArray[np.int64]:
+def instants(
+    frame: pl.DataFrame, name: str, path: str | Path, near_ns: int | None = None
+) -> npt.NDArray[np.int64]:
     """Return a column of instants as nanoseconds since 1970 UTC, shape (n,).
 
-    Seconds since 1970 (to the digit as written), ISO 8601 text or datetimes; without a zone UTC.
+    Seconds since 1970 (to the digit as written), ISO 8601 text, ``31.12.2026 14:03:22,5``,
+    datetimes; without a zone UTC. A time of day alone gets the date that brings it nearest to
+    `near_ns`, and a new one at midnight. ``Date+Time`` names two columns.
+
+    Parameters
+    ----------
+    near_ns
+        Start of the test; a time of day needs it.
 
     Raises
     ------
@@ -129,7 +113,9 @@ def instants(frame: pl.DataFrame, name: str, path: str | Path) -> npt.NDArray[np
         If the column is missing, a value is no instant, or the instants do not rise.
     """
     series = column(frame, name, path)
-    times = _instants(series, frame, name, path)
+    if clock.is_time_of_day(series):
+        return clock.dated(series, name, path, near_ns)
+    times = _instants(series, name, path)
     if times.null_count():
         raise _bad_value(name, path, series, times.is_null(), "an instant")
     found = times.to_numpy()
@@ -142,12 +128,14 @@ def instants(frame: pl.DataFrame, name: str, path: str | Path) -> npt.NDArray[np
     return found
 
 
-def _instants(series: pl.Series, frame: pl.DataFrame, name: str, path: str | Path) -> pl.Series:
+def _instants(series: pl.Series, name: str, path: str | Path) -> pl.Series:
     if isinstance(series.dtype, pl.Datetime):
         return series.dt.cast_time_unit("ns").cast(pl.Int64)
-    if series.dtype == pl.String and series.str.contains(r"\d-\d\d?-\d").any():
-        return _iso(series)
-    seconds = numbers(frame, name, path)
+    if series.dtype == pl.String:
+        series = clock.iso_dates(series)
+        if series.str.contains(r"\d-\d\d?-\d").any():
+            return _iso(series)
+    seconds = numbers(series.to_frame(), name, path)
     outside = ~((seconds > _UTC_SECONDS[0]) & (seconds < _UTC_SECONDS[1]))
     if outside.any():
         row = int(np.argmax(outside))
@@ -162,7 +150,7 @@ def _instants(series: pl.Series, frame: pl.DataFrame, name: str, path: str | Pat
 
 def _iso(series: pl.Series) -> pl.Series:
     """ISO 8601 text, with a zone or in UTC, to nanoseconds; null where it is none."""
-    text = series.str.strip_chars().str.replace(" ", "T", literal=True)
+    text = series.str.strip_chars().str.replace(r"\s+", "T").str.replace(",", ".", literal=True)
     text = text.str.replace(r"(Z|[+-]00:?00)$", "")
     zoned = re.compile(r"[+-]\d\d:?\d\d$")
     if any(zoned.search(value or "") for value in text.head(1)):

@@ -69,6 +69,21 @@ class Folder:
         return self._table("rejected")
 
     @cached_property
+    def points(self) -> pl.DataFrame:
+        """Table ``points``."""
+        return self._table("points")
+
+    @cached_property
+    def poses(self) -> pl.DataFrame:
+        """Table ``poses``."""
+        return self._table("poses")
+
+    @cached_property
+    def cycles(self) -> pl.DataFrame:
+        """Table ``cycles``."""
+        return self._table("cycles")
+
+    @cached_property
     def comparison(self) -> pl.DataFrame:
         """Table ``comparison``."""
         return self._table("comparison")
@@ -76,11 +91,12 @@ class Folder:
     @cached_property
     def config(self) -> dict[str, Any]:
         """Resolved configuration ``test.toml``; empty where the folder has none."""
-        path = self.path / "test.toml"
-        try:
-            return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-        except (OSError, ValueError) as error:
-            raise _unreadable(path, error) from error
+        return self._toml("test.toml")
+
+    @cached_property
+    def calibration(self) -> dict[str, Any]:
+        """Document of ``calibration.toml``; empty where the folder has none."""
+        return self._toml("calibration.toml")
 
     @cached_property
     def run(self) -> dict[str, Any]:
@@ -98,6 +114,13 @@ class Folder:
     def metadata(self) -> dict[str, str]:
         """What ``deflection.parquet`` says about itself."""
         return tables.metadata(self.path / "deflection.parquet")
+
+    def _toml(self, name: str) -> dict[str, Any]:
+        path = self.path / name
+        try:
+            return tomllib.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        except (OSError, ValueError) as error:
+            raise _unreadable(path, error) from error
 
     def _table(self, name: str) -> pl.DataFrame:
         """Table `name`; without rows where the folder has none."""

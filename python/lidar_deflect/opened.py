@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,6 +37,8 @@ class OpenedTest:
         Load channel in percent, or None.
     holds
         Its holds, or None.
+    shifts
+        Seconds by which the clocks of other instruments were moved, by file.
     """
 
     config: Config
@@ -48,6 +50,7 @@ class OpenedTest:
     holds: tuple[Hold, ...] | None
     progress: Progress | None
     threads: int | None
+    shifts: Mapping[Path, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -72,10 +75,10 @@ class OpenedTest:
                 ],
                 hint="correct source of [[lidars]]",
             )
-        load = instruments.load(config)
+        load = instruments.load(config, capture.first_time_ns)
         return cls(
             config,
-            files,
+            capture.paths,
             capture,
             capture.lidars,
             capture.missing,
@@ -84,6 +87,12 @@ class OpenedTest:
             progress,
             threads,
         )
+
+    def with_shifts(self, shifts: Mapping[Path, float]) -> OpenedTest:
+        """Return the same with the clocks of other instruments moved, seconds by file."""
+        load = instruments.load(self.config, self.capture.first_time_ns, shifts)
+        holds = None if load is None else hold_finder.from_load(load.time_ns, load.value)
+        return replace(self, load=load, holds=holds, shifts=shifts)
 
     def limits_ns(self, start_s: float | None, stop_s: float | None) -> tuple[int, int]:
         """Return limits in seconds since the first lidar packet as instants."""

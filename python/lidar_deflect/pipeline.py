@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect import capture as captures
-from lidar_deflect import channels, instruments, provenance, steps, tables
+from lidar_deflect import channels, comparison, instruments, matching, provenance, steps, tables
 from lidar_deflect import config as configs
 from lidar_deflect import holds as hold_finder
+from lidar_deflect import wires as wire_lines
 from lidar_deflect.calibrate import calibrate
 from lidar_deflect.calibration import Calibration, with_reference
 from lidar_deflect.checks import check
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from lidar_deflect.checks import Finding
     from lidar_deflect.config import Config
     from lidar_deflect.holds import Hold
+    from lidar_deflect.matching import Match
     from lidar_deflect.measurement import Inputs, States
     from lidar_deflect.measurement.inputs import Progress
     from lidar_deflect.measurement.unloaded import HoldCloud
@@ -145,7 +147,28 @@ class Test:
         opened = OpenedTest.of(self.config, paths, progress=progress, threads=threads)
         limits = opened.limits_ns(start_s, stop_s)
         watch.lap("scan")
-        known = self._known(calibration, opened, progress, threads)
+        name = method or self.config.measure.method
+        inputs, states = self._states(opened, calibration, name, limits, rate_hz, watch)
+        matches = matching.match(opened, inputs, states)
+        shifts = matching.shifts_of(matches)
+        watch.lap("clocks")
+        if shifts:  # the load says where the unloaded hold is: look again by the right clock
+            opened = opened.with_shifts(shifts)
+            if self.config.load.file in shifts:
+                inputs, states = self._states(opened, calibration, name, limits, rate_hz, watch)
+        return result_of(opened, inputs, states, name, watch, matches)
+
+    def _states(
+        self,
+        opened: OpenedTest,
+        calibration: Calibration | str | Path | None,
+        name: str,
+        limits: tuple[int, int],
+        rate_hz: float | None,
+        watch: provenance.Stopwatch,
+    ) -> tuple[Inputs, States]:
+        """Calibrate where that is still to be done, then measure by one method."""
+        known = self._known(calibration, opened, opened.progress, opened.threads)
         window = opened.unloaded_or_kept_ns(known)
         clouds = unloaded.collect_all(opened.capture, opened.lidars, window) if window else {}
         known = known or calibrate(self.config, clouds)
@@ -154,10 +177,9 @@ class Test:
             clouds, window = {}, None
         watch.lap("calibrate")
         inputs = opened.inputs(known, clouds, window, limits=limits, rate_hz=rate_hz)
-        name = method or self.config.measure.method
         states = _method(name)(inputs)
         watch.lap("measure")
-        return result_of(opened, inputs, states, name, watch)
+        return inputs, states
 
     def _known(
         self,
@@ -189,24 +211,39 @@ def with_unloaded_state(
 
 
 def result_of(
-    opened: OpenedTest, inputs: Inputs, states: States, method: str, watch: provenance.Stopwatch
+    opened: OpenedTest,
+    inputs: Inputs,
+    states: States,
+    method: str,
+    watch: provenance.Stopwatch,
+    matches: Sequence[Match] = (),
 ) -> Result:
     """Tables and provenance of what a method found."""
     first_ns = opened.capture.first_time_ns
     holds = _measured_holds(opened, states)
-    root = instruments.root(opened.config)
+    root = instruments.root(opened.config, first_ns, opened.shifts)
+    wires = instruments.wires(opened.config, first_ns, opened.shifts)
     deflection = tabulate.deflection(states, holds, load=opened.load, root=root, first_ns=first_ns)
     health = health_table(opened.capture, inputs.lidars, states)
-    given = [*([opened.load] if opened.load else []), *instruments.wires(opened.config), *root]
+    settings = opened.config.model_dump()
+    others = instruments.others(opened.config, first_ns, opened.shifts)
+    given = [*([opened.load] if opened.load else []), *wires, *root, *others]
+    given += wire_lines.predicted(deflection, settings)
+    averages = steps.average(deflection, holds)
     frames = {
         "deflection": deflection,
-        "steps": steps.average(deflection, holds),
+        "steps": averages,
         **{name: _timed(name, getattr(states, name), first_ns) for name in DETAILS},
         "health": health,
         "channels": channels.to_table(given, first_ns),
     }
+    compared = comparison.configured(
+        averages, settings, wires, instruments.prediction(opened.config)
+    )
+    if compared.height:
+        frames["comparison"] = compared
     watch.lap("tables")
-    run = provenance.run_document(opened, inputs, states, method, health, watch)
+    run = provenance.run_document(opened, inputs, states, method, health, watch, matches)
     return Result(frames, run, opened.config, inputs.calibration)
 
 

@@ -22,6 +22,14 @@ Block = Mapping[str, NDArray[Any]]
 PLAIN = ("sweep", "packet", "block", "ring", "azimuth_deg", "range_m")
 TAIL = ("intensity", "return_index")
 
+PIECE_BYTES = 1 << 18
+"""A column is packed in pieces of so many bytes; whole values of every type."""
+
+
+def frame_ids(block: Block) -> NDArray[np.float64]:
+    """Frame counts of the sensors; NaN where there are none, which no integer could say."""
+    return np.where(block["has_frame_id"], block["frame_id"].astype(np.float64), np.nan)
+
 
 class PointFile(ABC):
     """A file of points that is being written.
@@ -68,7 +76,10 @@ class PointFile(ABC):
 
 
 class NpzFile(PointFile):
-    """One array per column; columns grow in files of their own and are packed in the end."""
+    """One array per column; columns grow in files of their own and are packed in the end.
+
+    Names are put for their numbers when they are packed: as text they are the widest columns.
+    """
 
     def __init__(self, path: Path, lidars: Sequence[str], kinds: Sequence[str]) -> None:
         super().__init__(path, lidars, kinds)
@@ -77,17 +88,17 @@ class NpzFile(PointFile):
 
     def append(self, block: Block) -> None:
         """Add the points of a block."""
-        lidars, kinds = np.array(self.lidars), np.array(self.kinds)
         x, y, z = block["xyz"].T
         columns = {
             "time": block["time_ns"].astype("datetime64[ns]"),
-            "lidar": lidars[block["lidar"]],
+            "lidar": block["lidar"],
             **{name: block[name] for name in PLAIN},
+            "frame_id": frame_ids(block),
             "x_m": x,
             "y_m": y,
             "z_m": z,
             **{name: block[name] for name in TAIL},
-            "return_kind": kinds[block["return_kind"]],
+            "return_kind": block["return_kind"],
         }
         for name, values in columns.items():
             self._stream(name, values.dtype).write(np.ascontiguousarray(values).tobytes())
@@ -109,11 +120,16 @@ class NpzFile(PointFile):
             self.discard()
 
     def _pack(self, pack: zipfile.ZipFile, name: str, dtype: np.dtype[Any]) -> None:
-        header = {"descr": npy.dtype_to_descr(dtype), "fortran_order": False}
+        names = {"lidar": self.lidars, "return_kind": self.kinds}.get(name)
+        texts = None if names is None else np.array(names)
+        shown = dtype if texts is None else texts.dtype
+        header = {"descr": npy.dtype_to_descr(shown), "fortran_order": False}
         member = pack.open(f"{name}.npy", "w", force_zip64=True)
         with member, (self._folder / name).open("rb") as values:
             npy.write_array_header_2_0(member, header | {"shape": (self.points,)})
-            shutil.copyfileobj(values, member, 1 << 20)
+            while piece := values.read(PIECE_BYTES):
+                numbers = np.frombuffer(piece, dtype)
+                member.write(piece if texts is None else texts[numbers].tobytes())
         (self._folder / name).unlink()
 
     def discard(self) -> None:
@@ -138,6 +154,7 @@ class _Records(PointFile):
                 ("sweep", "<u4"),
                 ("packet", "<u4"),
                 ("block", "<u2"),
+                ("frame_id", "<f8"),
                 ("ring", "<u2"),
                 ("azimuth_deg", "<f4"),
                 ("range_m", "<f4"),
@@ -176,6 +193,7 @@ class _Records(PointFile):
         records["time"] = self.time(block["time_ns"])
         for name in ("lidar", *PLAIN, *TAIL, "return_kind"):
             records[name] = block[name]
+        records["frame_id"] = frame_ids(block)
         self._stream.write(records.tobytes())
         self.points += len(records)
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from lidar_deflect.config import Config
+    from lidar_deflect.matching import Match
     from lidar_deflect.measurement import Inputs, States
     from lidar_deflect.opened import OpenedTest
 
@@ -44,6 +45,7 @@ def run_document(
     method: str,
     health: pl.DataFrame,
     watch: Stopwatch,
+    matches: Sequence[Match] = (),
 ) -> Mapping[str, Any]:
     """Document of run.json."""
     return {
@@ -59,7 +61,12 @@ def run_document(
             "warnings": list(inputs.calibration.warnings),
         },
         "evidence": states.evidence,
-        "warnings": [*inputs.calibration.warnings, *states.warnings],
+        "channel_clocks": [each.facts() for each in matches],
+        "warnings": [
+            *inputs.calibration.warnings,
+            *states.warnings,
+            *(each.text() for each in matches if each.applied_s),
+        ],
         "timings_s": {stage: round(seconds, 3) for stage, seconds in watch.laps.items()},
         "gates": gates(opened.config, health, opened.absent),
     }

@@ -12,6 +12,7 @@ from lidar_deflect import tables
 from lidar_deflect.calibration import Calibration
 from lidar_deflect.files import whole_folder
 from lidar_deflect.folder import Folder
+from lidar_deflect.notebook import card
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -50,8 +51,26 @@ class Result:
         )
 
     def _repr_html_(self) -> str:
-        html: str = self.steps._repr_html_()
-        return f"<p>{self!r}</p>{html}"
+        """Return the sections at the largest load step, and what to know of them."""
+        from lidar_deflect.comparison import largest_step
+
+        step = largest_step(self.steps)
+        head = ("section", "s (m)", "dx (m)", "dy (m)", "dz (m)", "total (m)", "U (m)", "status")
+        rows = [
+            (
+                row["section"],
+                row["s_m"],
+                *(row[name] for name in ("dx_m", "dy_m", "dz_m", "d_m")),
+                None if row["ud_m"] is None else 2.0 * row["ud_m"],
+                row["status"],
+            )
+            for row in self.steps.iter_rows(named=True)
+            if row["step"] == step
+        ]
+        title = f"{self!r}, at {step}" if step else repr(self)
+        known = len(self.run["warnings"]) + len(self.failed_gates)
+        note = f"{known} warnings; U is the expanded uncertainty (k = 2)"
+        return card(title, head if rows else (), rows, note)
 
     @property
     def deflection(self) -> pl.DataFrame:

@@ -33,6 +33,10 @@ class Blade(Model):
     """The blade: whose drawing, how clamped, how well built."""
 
     reference: str = Field(default="iea15-110m", description="name of a published reference blade")
+    drawn: Annotated[int, Field(ge=0, lt=2**63)] | None = Field(
+        default=None,
+        description="seed of a blade that nobody published, in place of a reference; with length_m",
+    )
     length_m: Positive | None = Field(
         default=None, description="stretched to this length; default: its own"
     )
@@ -47,6 +51,16 @@ class Blade(Model):
     prebend_percent: NotNegative = Field(default=2.0, description="sigma of the built prebend")
     stiffness_percent: NotNegative = Field(default=5.0, description="sigma of each stiffness")
     waves_mm: NotNegative = Field(default=2.0, description="sigma of the surface about the drawing")
+    mould_mm: NotNegative = Field(
+        default=0.0,
+        description="sigma of errors of the section that keep their form along the blade",
+    )
+
+    @model_validator(mode="after")
+    def _length_of_a_drawn_one(self) -> Blade:
+        if self.drawn is not None and not 20 <= (self.length_m or 0) <= 200:
+            raise ValueError("a drawn blade needs length_m, 20 to 200 m")
+        return self
 
 
 class Saddle(Model):
@@ -89,6 +103,26 @@ class Sway(Model):
     phase_deg: Number = 0.0
 
 
+class Swing(Model):
+    """One mode of a fatigue test."""
+
+    direction: Direction = Field(description="of the tip")
+    order: Literal[1, 2] = Field(default=1, description="number of the bending mode")
+    amplitude_m: Positive = Field(description="at the tip")
+    phase_deg: Number = 0.0
+
+
+class Fatigue(Model):
+    """A blade that is swung after the first hold, all modes at one frequency."""
+
+    frequency_hz: Annotated[float, Field(ge=0.1, le=3)] = 0.6
+    cycles: Annotated[int, Field(ge=1, le=100_000)] = Field(
+        default=20, description="at full amplitude"
+    )
+    growth_s: Positive = Field(default=4.0, description="from rest to full amplitude")
+    swings: tuple[Swing, ...] = Field(min_length=1)
+
+
 class Ground(Model):
     """The ground: a sloped plane with rough heights on it."""
 
@@ -99,6 +133,9 @@ class Ground(Model):
     correlation_m: Positive = Field(
         default=0.8, description="distance over which heights are alike"
     )
+    swell_mm: NotNegative = Field(
+        default=0.0, description="sigma of wider swells, eight times as long"
+    )
 
 
 class Wall(Model):
@@ -108,6 +145,8 @@ class Wall(Model):
     slope: Number = Field(default=0.0225, description="change of x per metre of z")
     z_m: Range = (60.0, 140.0)
     top_m: Number = Field(default=0.0, description="height of its top")
+    bow_mm: Number = Field(default=0.0, description="its middle stands out against its ends")
+    lean: Number = Field(default=0.0, description="change of x per metre of height")
 
 
 class Box(Model):
@@ -115,6 +154,18 @@ class Box(Model):
 
     middle_m: Point
     size_m: tuple[Positive, Positive, Positive]
+
+
+class Target(Model):
+    """A surveyed retroreflector."""
+
+    name: Name
+    kind: Literal["sheet", "sphere"] = "sheet"
+    size_m: Positive = Field(
+        default=0.3, le=10, description="edge of a sheet, diameter of a sphere"
+    )
+    position_m: Point = Field(description="its centre")
+    facing: Direction = Field(default=(0.0, 0.0, -1.0), description="where a sheet faces")
 
 
 class Clock(Model):
@@ -127,11 +178,22 @@ class Clock(Model):
     )
 
 
+class Kick(Model):
+    """A tripod that somebody knocks against."""
+
+    at_s: Positive = Field(description="since the start")
+    turn_mrad: Point = Field(default=(0.0, 0.0, 0.0), description="about the world axes")
+    shift_mm: Point = Field(default=(0.0, 0.0, 0.0), description="of the optical centre")
+
+
 class Lidar(Model):
     """A lidar on the ground."""
 
     id: Name
-    model: str = "vlp16"
+    model: str = Field(
+        default="vlp16",
+        description="id of a sensor; one that cannot be simulated is refused with a list",
+    )
     address: Annotated[str, Field(pattern=r"^\d{1,3}(\.\d{1,3}){3}$")]
     port: Annotated[int, Field(gt=0, lt=65536)] = 2368
     position_m: Point = Field(description="optical centre")
@@ -141,6 +203,10 @@ class Lidar(Model):
     )
     rpm: Annotated[float, Field(ge=60, le=3000)] = 600.0
     clock: Clock = Clock()
+    kick: Kick | None = Field(default=None, description="moves it during the test")
+    silent_s: tuple[Range, ...] = Field(
+        default=(), description="spans in which nothing arrives from it"
+    )
 
     @field_validator("address")
     @classmethod
@@ -162,6 +228,13 @@ class Sensors(Model):
     unit_offset_mm: NotNegative = Field(default=4.0, description="sigma of the offset of each unit")
     incidence_bias_mm: Number = Field(
         default=0.0, description="error times (1 / cos(incidence) - 1)"
+    )
+    faint_bias_mm: Number = Field(
+        default=0.0, description="error for each halving of the light that comes back"
+    )
+    retro_bias_mm: Number = Field(default=0.0, description="error of range to retroreflectors")
+    noise_freedom: Annotated[int, Field(ge=0, le=1000)] = Field(
+        default=0, description="degrees of freedom of Student's noise; 0 = normal"
     )
     dropout: Probability = Field(default=0.01, description="echoes lost whatever they meet")
     merge_m: NotNegative = Field(default=0.45, description="echoes closer than this melt into one")
@@ -196,6 +269,8 @@ class Survey(Model):
     ground_points: Annotated[int, Field(ge=0, le=600)] = 24
     wall_points: Annotated[int, Field(ge=0, le=600)] = 8
     wire_mm: NotNegative = Field(default=2.0, description="noise of a draw wire")
+    target_mm: NotNegative = Field(default=1.0, description="sigma of surveyed targets")
+    root_mrad: NotNegative = Field(default=0.02, description="noise of the root's channel")
     load_percent: NotNegative = Field(default=0.08, description="noise of the load channel")
     rate_hz: Positive = Field(default=10.0, description="of load and wires")
     prediction_percent: NotNegative = Field(default=1.0, description="sigma of the prediction")
@@ -213,9 +288,11 @@ class Scene(Model):
     show_saddles: Flag = True
     cable_mm: NotNegative = Field(default=24.0, description="diameter of the cables; 0 = none")
     sways: tuple[Sway, ...] = ()
+    fatigue: Fatigue | None = None
     ground: Ground = Ground()
     wall: Wall | None = None
     boxes: tuple[Box, ...] = ()
+    targets: tuple[Target, ...] = ()
     lidars: tuple[Lidar, ...] = Field(min_length=1)
     sensors: Sensors = Sensors()
     network: Network = Network()
@@ -224,6 +301,8 @@ class Scene(Model):
 
     @model_validator(mode="after")
     def _distinct(self) -> Scene:
+        if self.fatigue is not None and len(self.loading.levels_percent) > 1:
+            raise ValueError("a fatigue test has one load level, held before it starts")
         for name in ("id", "address"):
             values = [getattr(lidar, name) for lidar in self.lidars]
             if len(set(values)) < len(values):

@@ -21,15 +21,16 @@ class StreamInfo:
         Its name: the id of the configuration, else ``address:port``.
     source, port, source_port
         Address of the sensor, port at the receiver; source port only where the content needs it.
+        Of a bag the topic, without ports.
     model, title, candidates
         Id and name of the model, and ids that the content cannot tell from it.
     beams
         Where the angles of the unit come from; begins with ``missing`` where there are none.
     return_mode
         ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with
-        its two returns in parentheses.
+        its two returns in parentheses; ``single`` where packets do not tell which it is.
     rpm
-        Turns a minute in the mean.
+        Turns a minute in the mean; None for sensors without a rotor.
     packets, lost, duplicated, late, too_late, foreign
         Data packets that were taken, that never came, came twice, came out of order, came too
         late to be put back; datagrams of the stream that are not the lidar's.
@@ -48,11 +49,13 @@ class StreamInfo:
         Set where two sensors share the name, so that sweeps would mix them.
     notes
         What else one should know.
+    key
+        Its name within the compiled core.
     """
 
     lidar: str
     source: str
-    port: int
+    port: int | None
     source_port: int | None
     model: str
     title: str
@@ -60,7 +63,7 @@ class StreamInfo:
     named: bool
     beams: str
     return_mode: str
-    rpm: float
+    rpm: float | None
     packets: int
     lost: int
     duplicated: int
@@ -76,10 +79,13 @@ class StreamInfo:
     position: Mapping[str, Any] | None
     conflict: str | None
     notes: tuple[str, ...]
+    key: str
 
     @property
     def address(self) -> str:
-        """``address:port``, with the source port where the content needs it."""
+        """``address:port``, with the source port where the content needs it; of a bag the topic."""
+        if self.port is None:
+            return self.source
         host = f"[{self.source}]" if ":" in self.source else self.source
         tail = "" if self.source_port is None else f"@{self.source_port}"
         return f"{host}:{self.port}{tail}"
@@ -145,7 +151,9 @@ def no_lidar(
 
 
 def _closest(stream: Mapping[str, Any]) -> str:
-    text = f"{stream['source']} -> port {stream['port']}, {stream['payload_bytes']} bytes"
+    is_topic = stream["source"].startswith("/")
+    place = "" if is_topic else f" -> port {stream['port']}"
+    text = f"{stream['source']}{place}, {stream['payload_bytes']} bytes"
     if stream["rate_hz"]:
         text += f", {stream['rate_hz']:.0f}/s"
     return f"{text}: {stream['why_not'] or 'no known sensor sends packets of this size'}"

@@ -1,12 +1,14 @@
 """Files that describe single units: the ones the user names, and the ones beside a capture."""
 
+import os
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lidar_deflect.errors import InvalidValueError
 
-__all__ = ["UnitFile", "beside", "named"]
+__all__ = ["UnitFile", "beside", "named", "scratch"]
 
 UnitFile = tuple[str | None, str, bytes, bool]
 """Source or none, name, content, and whether the user named it."""
@@ -44,6 +46,13 @@ def beside(captures: Sequence[Path]) -> list[UnitFile]:
                 except OSError:
                     continue  # nobody asked for it
     return [(None, path.name, content, False) for path, content in sorted(found.items())]
+
+
+def scratch() -> str:
+    """Folder for large temporary files: ``TMPDIR``, else ``/var/tmp``, which lies on a disk."""
+    if "TMPDIR" not in os.environ and os.access("/var/tmp", os.W_OK | os.X_OK):
+        return "/var/tmp"
+    return tempfile.gettempdir()
 
 
 def _siblings(capture: Path) -> Iterator[Path]:

@@ -33,7 +33,10 @@ def decode(
     out: Annotated[
         Path,
         typer.Option(
-            "--out", "-o", metavar="FILE", help="Kind by suffix: .parquet .csv .npz .ply .pcd .pcap"
+            "--out",
+            "-o",
+            metavar="FILE",
+            help="Kind by suffix: .parquet .csv .npz .las .laz .ply .pcd .pcap",
         ),
     ] = Path("points.parquet"),
     lidar: Lidars = None,

@@ -78,10 +78,10 @@ def _streams(document: Mapping[str, Any]) -> str:
 def _stream(stream: Mapping[str, Any]) -> list[str]:
     return [
         stream["source"],
-        str(stream["port"]),
+        "" if stream["port"] is None else str(stream["port"]),
         stream["model"],
         stream["return_mode"],
-        f"{stream['rpm']:.0f}",
+        "-" if stream["rpm"] is None else f"{stream['rpm']:.0f}",
         *(grouped(stream[key]) for key in COUNTS),
         stream["first_utc"][:19],
         f"{_seconds(stream['first_utc'], stream['last_utc']):.1f}",

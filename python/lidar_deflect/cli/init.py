@@ -111,4 +111,6 @@ def _candidates(stream: Mapping[str, Any]) -> str:
 
 def _with_port(stream: Mapping[str, Any]) -> str:
     source, port = stream["source"], stream["port"]
+    if port is None:
+        return str(source)
     return f"[{source}]:{port}" if ":" in source else f"{source}:{port}"

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 Captures = Annotated[
     list[Path],
     typer.Argument(
-        metavar="CAPTURE...", help="pcap or pcapng, plain, .gz or .zst; one file or many."
+        metavar="CAPTURE...",
+        help="pcap or pcapng, plain, .gz or .zst, or ROS bags; one file or many.",
     ),
 ]
 ConfigFile = Annotated[

@@ -4,7 +4,7 @@
 `recognise` says what a reference was taken for.
 """
 
-from lidar_deflect.comparison.compare import ComparisonWarning, compare, save
+from lidar_deflect.comparison.compare import ComparisonWarning, compare, configured, save
 from lidar_deflect.comparison.error import error_percent
 from lidar_deflect.comparison.methods import LIDAR, by_method, largest_step, wire_names
 from lidar_deflect.comparison.reference import KINDS, Kind, Reference, recognise
@@ -19,6 +19,7 @@ __all__ = [
     "aligned",
     "by_method",
     "compare",
+    "configured",
     "error_percent",
     "largest_step",
     "recognise",

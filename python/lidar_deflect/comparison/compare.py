@@ -9,12 +9,14 @@ import numpy as np
 import polars as pl
 
 from lidar_deflect import channels, tables
+from lidar_deflect import wires as wire_lines
 from lidar_deflect.comparison import measured as lidar
 from lidar_deflect.comparison.error import NEGLIGIBLE, error_percent
 from lidar_deflect.comparison.measured import AXES, Measured
 from lidar_deflect.comparison.reference import Reference, Wire, prediction, recognise, wires
 from lidar_deflect.errors import ResultError
 from lidar_deflect.folder import Folder
+from lidar_deflect.wires import Line
 
 Row = dict[str, Any]
 
@@ -72,7 +74,8 @@ def compare(
             code="comparison.no_steps",
             hint="a load channel under [load] names the steps where the data do not",
         )
-    found = list(_against(reference, rows, folder.steps, settings))
+    shifts = {each["file"]: each["applied_s"] for each in folder.run.get("channel_clocks") or ()}
+    found = list(_against(reference, rows, folder.steps, settings, shifts))
     if not found:
         raise ResultError(
             f"nothing in {reference.path} fits a step and section of {folder.path}",
@@ -84,6 +87,69 @@ def compare(
             ],
         )
     return _table(found)
+
+
+def configured(
+    steps: pl.DataFrame,
+    config: Mapping[str, Any],
+    read: Sequence[channels.Channel] = (),
+    predicted: channels.Prediction | None = None,
+) -> pl.DataFrame:
+    """Hold steps against the wires and the prediction that their configuration names.
+
+    Parameters
+    ----------
+    steps
+        Table ``steps``.
+    config
+        Configuration as a mapping.
+    read
+        Draw wires, on the clock of the lidars.
+    predicted
+        The prediction, or None.
+
+    Returns
+    -------
+    polars.DataFrame
+        Table ``comparison``; rows of virtual wires have no reference. Empty where nothing fits.
+    """
+    rows = lidar.of_steps(steps)
+    if not rows:
+        return tables.empty("comparison")
+    spans = lidar.spans_of(steps)
+    named = {channel.name: channel for channel in read}
+    lines = {line.name: line for line in wire_lines.lines(config)}
+    given = [
+        Wire(named[each["name"]], each["section"], None, lines.get(each["name"]))
+        for each in config.get("wires") or ()
+        if each["name"] in named
+    ]
+    found = list(_against_wires(given, rows, spans, steps))
+    for name, line in lines.items():
+        if name not in named:
+            found += _virtual(line, rows, steps)
+    if predicted is not None and any(each.row["load"] is not None for each in rows):
+        found += _against_prediction(predicted, rows, config)
+    return _table(found) if found else tables.empty("comparison")
+
+
+def _virtual(line: Line, rows: Sequence[Measured], steps: pl.DataFrame) -> Iterator[Row]:
+    turns = _turns(line, steps)
+    for each in rows:
+        if each.row["section"] == line.section:
+            yield _row(each, line.name, "wire", each.shortening(line, _turn(turns, each)), None)
+
+
+def _turns(line: Line, steps: pl.DataFrame) -> dict[object, lidar.Vector] | None:
+    """Rotation of a wire's section in every step, by its time; None where it is not needed."""
+    if not line.offset_m.any():
+        return None
+    times = steps.filter(pl.col("section") == line.section).sort("time")["time"].to_list()
+    return dict(zip(times, wire_lines.turns(steps, line.section), strict=True))
+
+
+def _turn(turns: dict[object, lidar.Vector] | None, each: Measured) -> lidar.Vector | None:
+    return None if turns is None else turns[each.row["time"]]
 
 
 def save(folder: str | Path | Folder, frame: pl.DataFrame) -> Path:
@@ -104,11 +170,15 @@ def _mapping(config: Any) -> Mapping[str, Any]:
 
 
 def _against(
-    reference: Reference, rows: Sequence[Measured], steps: pl.DataFrame, config: Mapping[str, Any]
+    reference: Reference,
+    rows: Sequence[Measured],
+    steps: pl.DataFrame,
+    config: Mapping[str, Any],
+    shifts: Mapping[str, float],
 ) -> Iterator[Row]:
     spans = lidar.spans_of(steps)
     if reference.kind == "wire":
-        yield from _against_wires(wires(reference, config), rows, spans)
+        yield from _against_wires(wires(reference, config, shifts), rows, spans, steps)
     elif reference.kind == "prediction":
         yield from _against_prediction(prediction(reference, config), rows, config)
     elif reference.kind == "truth":
@@ -118,18 +188,19 @@ def _against(
 
 
 def _against_wires(
-    given: Sequence[Wire], rows: Sequence[Measured], spans: pl.DataFrame
+    given: Sequence[Wire], rows: Sequence[Measured], spans: pl.DataFrame, steps: pl.DataFrame
 ) -> Iterator[Row]:
     zero_ns = lidar.reference_span_ns(spans)
     for wire in given:
         zero = wire.channel.mean(*zero_ns) if zero_ns else 0.0
         zero = zero if np.isfinite(zero) else 0.0
+        turns = None if wire.line is None else _turns(wire.line, steps)
         for each in rows:
             if not _is_tied_to(wire, each):
                 continue
             reading = wire.channel.mean(*lidar.span_ns(each.row, spans)) - zero
             if np.isfinite(reading):
-                yield from _against_wire(wire, each, reading)
+                yield from _against_wire(wire, each, reading, _turn(turns, each))
 
 
 def _is_tied_to(wire: Wire, each: Measured) -> bool:
@@ -142,14 +213,16 @@ def _is_same(s_m: float, other_m: float) -> bool:
     return abs(s_m - other_m) <= channels.SAME_SECTION_M
 
 
-def _against_wire(wire: Wire, each: Measured, reading: float) -> Iterator[Row]:
-    if wire.anchor_m is not None and wire.attach == "mid_chord":
-        along = each.shortening(np.array(wire.anchor_m))
+def _against_wire(
+    wire: Wire, each: Measured, reading: float, turn: lidar.Vector | None
+) -> Iterator[Row]:
+    if wire.line is not None:
+        along = each.shortening(wire.line, turn)
         yield _row(each, wire.channel.name, "wire", along, reading)
     else:
         warnings.warn(
-            f"wire {wire.channel.name}: only wires of known anchor at the mid-chord point are "
-            "projected; it is held against the total deflection alone",
+            f"wire {wire.channel.name}: its line is not known; it is held against the total "
+            "deflection alone",
             ComparisonWarning,
             stacklevel=2,
         )
@@ -224,7 +297,7 @@ def _against_run(other: Folder, rows: Sequence[Measured]) -> Iterator[Row]:
 
 
 def _row(
-    each: Measured, source: str, quantity: str, own: tuple[float, float], reference_m: float
+    each: Measured, source: str, quantity: str, own: tuple[float, float], reference_m: float | None
 ) -> Row:
     head = {key: each.row[key] for key in ("time", "t_s", "step", "section", "s_m")}
     values = {"measured_m": own[0], "u_m": own[1], "reference_m": reference_m}
@@ -233,8 +306,9 @@ def _row(
 
 def _table(rows: Sequence[Row]) -> pl.DataFrame:
     frame = pl.DataFrame(list(rows), infer_schema_length=None)
+    frame = frame.with_columns(pl.col("reference_m").cast(pl.Float64))
     largest = frame.select(pl.col("reference_m").abs().max().over("source")).to_series()
-    small = frame["reference_m"].abs() <= NEGLIGIBLE * largest
+    small = (frame["reference_m"].abs() <= NEGLIGIBLE * largest).fill_null(value=True)
     errors = error_percent(frame["measured_m"].to_numpy(), frame["reference_m"].to_numpy())
     return tables.build(
         "comparison", frame.with_columns(error_percent=np.where(small, np.nan, errors))

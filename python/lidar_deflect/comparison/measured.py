@@ -8,6 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import polars as pl
 
+from lidar_deflect.wires import Line, spans, unit_vector
+
 Vector = npt.NDArray[np.float64]
 AXES = ("x", "y", "z")
 
@@ -44,13 +46,20 @@ class Measured:
         u = float(np.sqrt(np.sum((direction * self.u_m) ** 2)))
         return float(self.deflection_m @ direction), u
 
-    def shortening(self, anchor_m: Vector) -> tuple[float, float]:
-        """Return what a wire from `anchor_m` to the mid-chord point would have read.
+    def shortening(self, line: Line, turn: Vector | None = None) -> tuple[float, float]:
+        """Return what a wire would have read, and its uncertainty.
 
-        That is the distance from anchor to point in the reference, minus the distance in the hold.
+        That is the distance from anchor to tie in the reference, minus the distance in the hold.
+
+        Parameters
+        ----------
+        line
+            Line of the wire.
+        turn
+            Rotation of the section since the reference, shape (3, 3); needed where the wire is
+            tied beside the mid-chord point.
         """
-        loaded = self.place_m - anchor_m
-        unloaded = loaded - self.deflection_m
+        loaded, unloaded = spans(line, self.place_m, self.deflection_m, turn)
         length = float(np.linalg.norm(loaded))
         u = float(np.sqrt(np.sum((loaded / length * self.u_m) ** 2)))
         return float(np.linalg.norm(unloaded)) - length, u
@@ -108,13 +117,3 @@ def load_direction(config: Mapping[str, Any], rows: Sequence[Measured]) -> Vecto
         return unit_vector(given)
     largest = max(rows, key=lambda each: float(np.linalg.norm(each.deflection_m)))
     return unit_vector(largest.deflection_m.tolist())
-
-
-def unit_vector(given: str | Sequence[float]) -> Vector:
-    """Turn a world axis such as ``-x``, or a vector, into a unit vector."""
-    if isinstance(given, str):
-        vector = np.zeros(3)
-        vector[AXES.index(given[-1])] = -1.0 if given.startswith("-") else 1.0
-        return vector
-    vector = np.asarray(given, dtype=np.float64)
-    return vector / max(float(np.linalg.norm(vector)), 1e-300)

@@ -19,6 +19,7 @@ _SCHEMA = pl.Schema(
         "value_m": pl.Float64(),
         "reference_m": pl.Float64(),
         "error_percent": pl.Float64(),
+        "u_m": pl.Float64(),
     }
 )
 
@@ -47,7 +48,8 @@ def by_method(frame: pl.DataFrame, *, step: str | None = None) -> pl.DataFrame:
     -------
     polars.DataFrame
         Columns ``section``, ``s_m``, ``method`` (``wire``, ``lidar``), ``against``, ``value_m``,
-        ``reference_m``, ``error_percent``, by arc length, wires first as in the paper; without rows
+        ``reference_m``, ``error_percent``, ``u_m`` (standard uncertainty of the value, null for
+        wires), by arc length, wires first as in the paper; without rows
         where there is no trusted total. The wires' readings are taken as they are, the lidars'
         total deflections likewise.
     """
@@ -65,7 +67,8 @@ def by_method(frame: pl.DataFrame, *, step: str | None = None) -> pl.DataFrame:
 def _row(row: dict[str, object], method: str, against: str, value_m: float) -> tuple[object, ...]:
     true = row["reference_m"]
     error = float(error_percent(value_m, true)) if isinstance(true, float) and true else None
-    return (row["section"], row["s_m"], method, against, value_m, true, error)
+    u = row["u_m"] if method == LIDAR else None
+    return (row["section"], row["s_m"], method, against, value_m, true, error, u)
 
 
 def _totals(rows: pl.DataFrame, source: str) -> pl.DataFrame:

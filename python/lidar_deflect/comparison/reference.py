@@ -7,7 +7,9 @@ from pathlib import Path
 from typing import Any, Literal, get_args
 
 from lidar_deflect import channels, delimited
+from lidar_deflect import wires as wire_lines
 from lidar_deflect.errors import InvalidValueError, ResultError, ResultNotFoundError
+from lidar_deflect.wires import Line
 
 Kind = Literal["wire", "prediction", "truth", "run"]
 KINDS: tuple[str, ...] = get_args(Kind)
@@ -142,12 +144,18 @@ class Wire:
     channel: channels.Channel
     section: str | None
     s_m: float | None
-    anchor_m: tuple[float, float, float] | None
-    attach: str | tuple[float, float]
+    line: Line | None
 
 
-def wires(reference: Reference, config: Mapping[str, Any]) -> list[Wire]:
+def wires(
+    reference: Reference, config: Mapping[str, Any], shifts: Mapping[str, float] | None = None
+) -> list[Wire]:
     """Read the wires of a file as ``[[wires]]`` says, else one per column that names a section.
+
+    Parameters
+    ----------
+    shifts
+        Seconds by which the clocks of files were moved when the run was measured, by file name.
 
     Raises
     ------
@@ -156,7 +164,10 @@ def wires(reference: Reference, config: Mapping[str, Any]) -> list[Wire]:
     """
     names = delimited.read(reference.path).columns
     given = [each for each in config.get("wires") or () if each.get("column") in names]
-    found = [_configured(reference, each) for each in given] or _wires_by_names(reference, names)
+    lines = {line.name: line for line in wire_lines.lines(config)}
+    moved_s = (shifts or {}).get(reference.path.name, 0.0)
+    found = [_configured(reference, each, lines, moved_s) for each in given]
+    found = found or _wires_by_names(reference, names, moved_s)
     if not found:
         raise ResultError(
             f"no column of {reference.path} is a draw wire",
@@ -167,7 +178,9 @@ def wires(reference: Reference, config: Mapping[str, Any]) -> list[Wire]:
     return found
 
 
-def _configured(reference: Reference, given: Mapping[str, Any]) -> Wire:
+def _configured(
+    reference: Reference, given: Mapping[str, Any], lines: Mapping[str, Line], moved_s: float
+) -> Wire:
     channel = channels.read_wire(
         reference.path,
         name=given["name"],
@@ -176,18 +189,12 @@ def _configured(reference: Reference, given: Mapping[str, Any]) -> Wire:
         unit=given.get("unit", "mm"),
         negate=given.get("negate", False),
     )
-    attach = given.get("attach", "mid_chord")
-    x, y, z = given["anchor_m"]
-    return Wire(
-        channel,
-        given["section"],
-        None,
-        (float(x), float(y), float(z)),
-        attach if isinstance(attach, str) else (attach[0], attach[1]),
-    )
+    shift_s = given.get("shift_s")
+    channel = channel.shifted(moved_s if shift_s is None else shift_s)
+    return Wire(channel, given["section"], None, lines.get(given["name"]))
 
 
-def _wires_by_names(reference: Reference, names: list[str]) -> list[Wire]:
+def _wires_by_names(reference: Reference, names: list[str], moved_s: float) -> list[Wire]:
     """Columns such as ``s84_mm``: readings at 84 m in millimetres, along an unknown line."""
     time = time_column(names)
     found = []
@@ -197,5 +204,5 @@ def _wires_by_names(reference: Reference, names: list[str]) -> list[Wire]:
             channel = channels.read_wire(
                 reference.path, name=name, column=name, time=time or "", unit=unit[1]
             )
-            found.append(Wire(channel, None, float(number[0]), None, "mid_chord"))
+            found.append(Wire(channel.shifted(moved_s), None, float(number[0]), None))
     return found

@@ -83,7 +83,7 @@ def _ascending(pair: tuple[float, float]) -> tuple[float, float]:
 
 
 def _source(value: str) -> str:
-    """Check ``address`` or ``address:port``; IPv6 with a port stands in brackets."""
+    """Check ``address``, ``address:port`` (IPv6 with a port in brackets), or the topic of a bag."""
     split_source(value)
     return value
 
@@ -91,6 +91,9 @@ def _source(value: str) -> str:
 def split_source(source: str) -> tuple[str, int | None]:
     """Split a stream's name into its address in canonical form and its port, if it names one."""
     import ipaddress
+
+    if re.fullmatch(r"(/\w+)+", source):
+        return source, None
 
     match = re.fullmatch(r"\[(?P<v6>[^\]]+)\](?::(?P<port>\d+))?", source) or re.fullmatch(
         r"(?P<v6>[^:]+):(?P<port>\d+)", source
@@ -101,7 +104,7 @@ def split_source(source: str) -> tuple[str, int | None]:
     try:
         return str(ipaddress.ip_address(address)), None if port is None else int(port)
     except ValueError:
-        text = 'Input should be an address, such as "192.168.1.201" or "[fe80::1]:2368"'
+        text = 'Input should be an address or topic, such as "192.168.1.201" or "/lidar_1/packets"'
         raise PydanticCustomError("source", text) from None
 
 

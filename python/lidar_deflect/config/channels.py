@@ -37,12 +37,30 @@ class Wire(Model):
     negate: Flag = Field(
         default=False, description="true where the reading grows with the distance"
     )
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
+    )
 
     @model_validator(mode="after")
     def _has_column(self) -> Self:
         if self.file is not None and self.column is None:
             raise problem("column", "a wire with a file needs the column of its reading")
         return self
+
+
+class OtherChannel(Model):
+    """Any other instrument (strain, inclinometer, wind): kept and shown beside the deflection."""
+
+    name: Name = Field(description="name of the channel in tables and figures")
+    file: FilePath = Field(description="channel file")
+    time: Column = Field(default="time_utc_s", description="column of the time, UTC")
+    column: Column = Field(description="column of the reading")
+    unit: str = Field(default="", description="its unit, as it is to be shown")
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
+    )
 
 
 class Root(Model):
@@ -54,6 +72,10 @@ class Root(Model):
     ry: Column | None = Field(default=None, description="column of the rotation about y, in mrad")
     rz: Column | None = Field(default=None, description="column of the rotation about z, in mrad")
     u_mrad: Positive = Field(default=0.05, description="standard uncertainty of each rotation")
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
+    )
 
     @model_validator(mode="after")
     def _has_a_rotation(self) -> Self:
@@ -84,8 +106,15 @@ class Load(Model):
     file: FilePath | None = Field(default=None, description="channel file; steps come from it")
     time: Column = Field(default="time_utc_s", description="column of the time, UTC")
     value: Column | None = Field(default=None, description="column of the load")
-    unit: Literal["percent", "fraction"] = Field(
-        default="percent", description="percent | fraction"
+    unit: Literal["percent", "fraction", "N", "kN", "MN", "Nm", "kNm", "MNm", "t", "bar", "V"] = (
+        Field(
+            default="percent",
+            description="percent | fraction, or N kN MN Nm kNm MNm t bar V (highest hold: 100 %)",
+        )
+    )
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
     )
     direction: Direction | None = Field(
         default=None, description="world axis or vector; default: of the largest deflection"

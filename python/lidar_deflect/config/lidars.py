@@ -99,7 +99,7 @@ class Lidar(Model):
     )
     source: Source | None = Field(
         default=None,
-        description="address or address:port its packets come from; needed with several lidars",
+        description="address, address:port or topic of its packets; needed with several lidars",
     )
     position_m: Point | None = Field(
         default=None,

@@ -30,31 +30,24 @@ SAMPLE_POINTS = 500
 """Points of one lidar that are kept of such a frame."""
 
 
-def distances_of(inputs: Inputs, plan: Plan) -> Floats:
-    """Smallest and largest distance d of (10), from the mean of the blade's points to each lidar.
+def contours_of(inputs: Inputs, plan: Plan) -> ContourRun:
+    """Run steps 5 to 10 on every frame, in two passes: (10) needs the distances of the whole test.
 
-    Returns
-    -------
-    numpy.ndarray
-        Shape (lidars, 2), metres, over the whole test; NaN for a lidar that saw no blade.
-    """
-    run = _native.DistancePass(_frame_plan(inputs, plan))
-    while run.advance(BLOCK_FRAMES, inputs.threads, inputs.listener("survey")):
-        pass
-    return run.ranges_m()
-
-
-def contours_of(inputs: Inputs, plan: Plan, distances_m: Floats) -> ContourRun:
-    """Run steps 5 to 10 on every frame.
+    The first pass keeps its frames as far as memory allows, so that a test of minutes is read once.
 
     Raises
     ------
     MeasurementError
         If no frame shows the blade at all.
     """
+    frames = _frame_plan(inputs, plan)
+    survey = _native.DistancePass(frames)
+    while survey.advance(BLOCK_FRAMES, inputs.threads, inputs.listener("survey")):
+        pass
     run = _native.ContourPass(
-        _frame_plan(inputs, plan),
-        _native.FrameParams(**_parameters(inputs, plan, distances_m)),
+        frames,
+        _native.FrameParams(**_parameters(inputs, plan, survey.ranges_m())),
+        survey,
         sample_every=max(1, round(SAMPLE_S * inputs.rate_hz)),
         sample_points=SAMPLE_POINTS,
     )

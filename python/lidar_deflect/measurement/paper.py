@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect.measurement.contours import ContourRun, contours_of, distances_of
+from lidar_deflect.measurement.contours import ContourRun, contours_of
 from lidar_deflect.measurement.plan import Plan, make_plan
 from lidar_deflect.measurement.plane import choose_plane
 from lidar_deflect.measurement.reference import Reference, reference_of
@@ -43,8 +43,7 @@ def measure(inputs: Inputs) -> States:
         Where no frame gives contours, or the unloaded blade is not known.
     """
     plan = plan_of(inputs)
-    distances = distances_of(inputs, plan)  # step 6, first pass: d over the whole test
-    contours = contours_of(inputs, plan, distances)  # steps 5 to 10, second pass
+    contours = contours_of(inputs, plan)  # steps 5 to 10
     plane, plane_warnings = choose_plane(inputs.config, contours)  # step 10, auto
     reference = reference_of(inputs, contours, plane)  # (15) in the unloaded state
     position, status, reason = sections_over_time(inputs, contours, reference)  # steps 11, 12
@@ -103,7 +102,7 @@ def sections_over_time(
 def calibrated_reference(inputs: Inputs) -> Mapping[str, Any]:
     """Return the unloaded blade for a calibration file: the reference and the plan that saw it."""
     plan = plan_of(inputs)
-    contours = contours_of(inputs, plan, distances_of(inputs, plan))
+    contours = contours_of(inputs, plan)
     plane, _ = choose_plane(inputs.config, contours)
     reference = reference_of(inputs, contours, plane)
     return {"plan": plan.to_dict(), "state": reference.to_dict()}

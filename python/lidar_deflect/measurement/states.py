@@ -40,6 +40,11 @@ class States:
         Points that counted as blade, shape (t, lidars), in the order of the calibration.
     contour, points, rejected
         Columns of the tables of these names, without ``t_s``.
+    u_position_m, u_deflection_m, u_total_m
+        Standard uncertainties of position and deflection, shape (t, s, 3), and of the deflection's
+        norm, shape (t, s); None under a method that has none.
+    twist_deg, u_twist_deg
+        Twist change and its standard uncertainty, shape (t, s); None likewise.
     evidence
         What was decided on the way, for run.json.
     warnings
@@ -59,6 +64,11 @@ class States:
     contour: Mapping[str, Any]
     points: Mapping[str, Any]
     rejected: Mapping[str, Any]
+    u_position_m: Floats | None = None
+    u_deflection_m: Floats | None = None
+    u_total_m: Floats | None = None
+    twist_deg: Floats | None = None
+    u_twist_deg: Floats | None = None
     evidence: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
 

@@ -62,8 +62,22 @@ def deflection(
         "reason": list(states.reason.ravel()),
     }
     columns |= _vectors("{}_m", states.position_m) | _vectors("d{}_m", states.deflection_m)
-    columns |= _without_root_motion(states, root) | NO_UNCERTAINTY
+    columns |= _without_root_motion(states, root) | _uncertainty(states)
     return tables.build("deflection", columns)
+
+
+def _uncertainty(states: States) -> dict[str, Any]:
+    """Columns of uncertainty and twist; null under a method that has none."""
+    found = dict(NO_UNCERTAINTY)
+    if states.u_position_m is not None and states.u_deflection_m is not None:
+        found |= _vectors("u{}_m", states.u_position_m)
+        found |= _vectors("ud{}_m", states.u_deflection_m)
+    scalars = {
+        "ud_m": states.u_total_m,
+        "twist_deg": states.twist_deg,
+        "utwist_deg": states.u_twist_deg,
+    }
+    return found | {name: x.ravel() for name, x in scalars.items() if x is not None}
 
 
 def _vectors(pattern: str, values: NDArray[np.float64]) -> dict[str, Any]:

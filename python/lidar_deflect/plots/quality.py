@@ -1,11 +1,17 @@
 """Figures of how well it went: errors by method (the paper's figure 20), health of the lidars."""
 
+from typing import Any
+
 import plotly.graph_objects as go
 import polars as pl
 
 from lidar_deflect import comparison as held_against
+from lidar_deflect import words
 from lidar_deflect.plots import style
 from lidar_deflect.plots.source import HasTables, table
+
+_MOST_SECONDS = 1500
+_MOST_POINTS = 4000
 
 
 def comparison(result: HasTables, step: str | None = None) -> go.Figure:
@@ -14,7 +20,7 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
     frame = table(result, "comparison")
     bars = _bars(frame, step or held_against.largest_step(frame))
     if bars.is_empty():
-        return style.note(figure, "nothing was compared")
+        return style.note(figure, words.PLOT["nothing_was_compared"])
     for k, name in enumerate(bars["name"].unique(maintain_order=True)):
         rows = bars.filter(pl.col("name") == name)
         figure.add_trace(
@@ -23,6 +29,7 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
                 y=rows["error_percent"],
                 name=style.text(name),
                 marker={"color": style.colour(k), "pattern": {"shape": ["", "/", ".", "x"][k % 4]}},
+                error_y=_intervals(rows["interval_percent"]),
                 text=[f"{value:z.2f}" for value in rows["error_percent"]],
                 textposition="outside",
                 cliponaxis=False,
@@ -32,11 +39,18 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
     order = [
         style.text(section) for section in bars.sort("s_m")["section"].unique(maintain_order=True)
     ]
-    figure.update_xaxes(title_text="section", type="category", showgrid=False)
+    figure.update_xaxes(title_text=words.PLOT["section"], type="category", showgrid=False)
     figure.update_xaxes(categoryorder="array", categoryarray=order)
-    figure.update_yaxes(title_text="error (%)")
+    figure.update_yaxes(title_text=words.PLOT["error"])
     figure.update_layout(barmode="group", height=440)
     return figure
+
+
+def _intervals(half: pl.Series) -> dict[str, Any] | None:
+    """Error bars, none where no method states an uncertainty."""
+    if half.null_count() == len(half):
+        return None
+    return {"type": "data", "array": half.fill_null(0.0)}
 
 
 def _bars(frame: pl.DataFrame, step: str | None) -> pl.DataFrame:
@@ -49,33 +63,49 @@ def _bars(frame: pl.DataFrame, step: str | None) -> pl.DataFrame:
     else:
         name = "lidar against " + pl.col("source") + ", " + pl.col("quantity")
         found = frame.filter(pl.col("step") == (step or "")).sort("s_m").with_columns(name=name)
-    return found.select("section", "s_m", "name", "error_percent").drop_nulls()
+    interval = 100.0 * style.COVERAGE * pl.col("u_m") / pl.col("reference_m").abs()
+    return found.select(
+        "section", "s_m", "name", "error_percent", interval_percent=interval
+    ).drop_nulls("error_percent")
 
 
 def health(result: HasTables) -> go.Figure:
-    """Draw lost packets, and points on the blade, per lidar and second."""
-    figure = style.panels(2, shared_xaxes=True)
+    """Draw loss, points on the blade, coverage and clock, per lidar and second."""
+    figure = style.panels(5, shared_xaxes=True)
     frame = table(result, "health").sort("t_s")
     if frame.is_empty():
-        return style.note(figure, "no health was written")
+        return style.note(figure, words.PLOT["no_health_was_written"])
     counted = frame["blade_points"].null_count() < frame.height
-    points = "blade_points" if counted else "points"
     due = pl.col("packets").cast(pl.Int64) + pl.col("lost").cast(pl.Int64)
-    lost = 100.0 * pl.col("lost").cast(pl.Float64) / due.clip(lower_bound=1)
-    frame = frame.with_columns(lost_percent=lost)
+    frame = frame.with_columns(
+        lost_percent=100.0 * pl.col("lost").cast(pl.Float64) / due.clip(lower_bound=1),
+        coverage_percent=100.0 * pl.col("coverage"),
+        clock_ms=1e3 * pl.col("clock_offset_s"),
+    )
+    panels = (
+        ("lost_percent", words.PLOT["lost"]),
+        ("blade_points", words.PLOT["blade_points"])
+        if counted
+        else ("points", words.PLOT["points"]),
+        ("coverage_percent", words.PLOT["coverage"]),
+        ("rpm", words.PLOT["turns"]),
+        ("clock_ms", words.PLOT["clock_utc"]),
+    )
     for k, lidar in enumerate(frame["lidar"].unique().sort()):
         part = frame.filter(pl.col("lidar") == lidar)
-        for row, name in enumerate(("lost_percent", points), start=1):
+        for row, (name, _) in enumerate(panels, start=1):
             figure.add_trace(_line(part, name, lidar, k, first=row == 1), row=row, col=1)
-    figure.update_yaxes(title_text="lost (%)", rangemode="tozero", row=1, col=1)
-    label = "blade points (1/s)" if counted else "points (1/s)"
-    figure.update_yaxes(title_text=label, rangemode="tozero", row=2, col=1)
-    figure.update_xaxes(title_text="time (s)", row=2, col=1)
-    figure.update_layout(height=460)
+    for row, (_, label) in enumerate(panels, start=1):
+        figure.update_yaxes(title_text=label, row=row, col=1)
+    figure.update_yaxes(rangemode="tozero", row=1, col=1)
+    figure.update_yaxes(rangemode="tozero", row=2, col=1)
+    figure.update_xaxes(title_text=words.PLOT["time"], row=5, col=1)
+    figure.update_layout(height=780)
     return figure
 
 
 def _line(part: pl.DataFrame, name: str, lidar: str, k: int, *, first: bool) -> go.Scatter:
+    part = style.thinned(part, [name], _MOST_SECONDS)
     return go.Scatter(
         x=part["t_s"],
         y=part[name],
@@ -86,3 +116,30 @@ def _line(part: pl.DataFrame, name: str, lidar: str, k: int, *, first: bool) -> 
         showlegend=first,
         hovertemplate="%{x:.0f} s<br>%{y:.6g}<extra>%{fullData.name}</extra>",
     )
+
+
+def residuals(result: HasTables) -> go.Figure:
+    """Draw how far the blade's points lie from the model along the span, by lidar."""
+    figure = style.plain()
+    points = table(result, "points").drop_nulls(["s_m", "residual_m"])
+    if points.is_empty():
+        return style.note(figure, words.PLOT["this_method_keeps_no_residuals"])
+    lidars = points["lidar"].unique().sort()
+    for k, lidar in enumerate(lidars):
+        part = points.filter(pl.col("lidar") == lidar).sort("s_m")
+        part = part.gather_every(-(-part.height // (_MOST_POINTS // len(lidars))))
+        figure.add_trace(
+            go.Scatter(
+                x=part["s_m"],
+                y=1e3 * part["residual_m"],
+                mode="markers",
+                name=style.text(lidar),
+                marker={"color": style.colour(k), "symbol": style.symbol(k), "size": 4},
+                opacity=0.5,
+                hovertemplate="%{x:.1f} m<br>%{y:.1f} mm<extra>%{fullData.name}</extra>",
+            )
+        )
+    figure.update_xaxes(title_text=words.PLOT["arc_length_s"])
+    figure.update_yaxes(title_text=words.PLOT["measured_model"])
+    figure.update_layout(height=420)
+    return figure

@@ -1,19 +1,24 @@
-"""Figures over time and over load: the paper's figures 19 and 21, and load against deflection."""
+"""Figures over time: the paper's figures 19 and 21, and draw wires beside the lidars."""
 
+from collections.abc import Sequence
 from typing import Literal
 
 import plotly.graph_objects as go
 import polars as pl
 
+from lidar_deflect import wires as virtual
+from lidar_deflect import words
+from lidar_deflect.channels import from_table
 from lidar_deflect.plots import style
-from lidar_deflect.plots.source import HasTables, section_of, sections
+from lidar_deflect.plots.source import HasTables, configuration, section_of, table
 
 Quantity = Literal["deflection", "position"]
 
 MOST_STATES = 6000
-"""More states than this are thinned evenly: a screen has fewer columns."""
+"""More states than this are thinned: a screen has fewer columns."""
 
-_COVERAGE = 1.96  # 95 % of a normal distribution
+_COVERAGE = style.COVERAGE
+_MOST_GAPS = 300
 _NAMES: dict[Quantity, tuple[str, str, str]] = {
     "deflection": ("d{}_m", "ud{}_m", "d{}"),
     "position": ("{}_m", "u{}_m", "{}"),
@@ -21,26 +26,25 @@ _NAMES: dict[Quantity, tuple[str, str, str]] = {
 
 
 def time_series(
-    result: HasTables, section: str | float | None = None, quantity: Quantity = "deflection"
+    result: HasTables,
+    section: str | float | None = None,
+    quantity: Quantity = "deflection",
+    most_states: int = MOST_STATES,
 ) -> go.Figure:
     """Draw x, y and z of one section over time, as the paper's figures 19 and 21 do."""
     name, s_m = section_of(result.deflection, section)
-    frame = _thinned(result.deflection.filter(pl.col("section") == name).sort("time"))
+    frame = result.deflection.filter(pl.col("section") == name).sort("time")
+    frame = style.thinned(frame, ["dx_m", "dy_m", "dz_m"], most_states)
     figure = style.panels(3, shared_xaxes=True)
     for row, axis in enumerate("xyz", start=1):
         _component(figure, frame, axis, row, quantity)
         _marks(figure, frame, axis, row, quantity)
     _shade_holds(figure, result.steps)
     _shade_missing(figure, frame)
-    figure.update_xaxes(title_text="time (s)", row=3, col=1)
-    figure.update_layout(height=620, margin_t=64, meta={"section": name, "s_m": s_m})
+    figure.update_xaxes(title_text=words.PLOT["time"], row=3, col=1)
+    figure.update_layout(height=560, margin_t=64, meta={"section": name, "s_m": s_m})
     figure.update_layout(legend_y=1.04)  # above the labels of the holds
     return figure
-
-
-def _thinned(frame: pl.DataFrame) -> pl.DataFrame:
-    every = -(-frame.height // MOST_STATES)
-    return frame.gather_every(every) if every > 1 else frame
 
 
 def _component(
@@ -81,7 +85,7 @@ def _band(figure: go.Figure, frame: pl.DataFrame, value: str, u: str, row: int, 
                 fillcolor=style.translucent(hue, 0.2),
                 line={"width": 0},
                 hoverinfo="skip",
-                name="95 %",
+                name=words.PLOT["95"],
                 legendgroup="95 %",
                 showlegend=row == 1 and k == 0,
             ),
@@ -116,26 +120,43 @@ def _marks(figure: go.Figure, frame: pl.DataFrame, axis: str, row: int, quantity
 
 def _shade_holds(figure: go.Figure, steps: pl.DataFrame) -> None:
     """Shade the holds of the test, with their labels."""
-    for label, start, stop in _hold_seconds(steps):
-        figure.add_vrect(
-            x0=start,
-            x1=stop,
-            fillcolor=style.FAINT,
-            line_width=0,
-            layer="below",
-            row="all",
-            col=1,
-        )
-        figure.add_annotation(
-            x=(start + stop) / 2.0,
-            y=1.0,
-            xref="x",
-            yref="y domain",
-            yanchor="bottom",
-            text=style.text(label),
-            showarrow=False,
-            font={"size": 11, "color": style.GREY},
-        )
+    spans = _hold_seconds(steps)
+    _shade(figure, [(start, stop) for _, start, stop in spans], style.FAINT)
+    labels = [
+        {
+            "x": (start + stop) / 2.0,
+            "y": 1.0,
+            "xref": "x",
+            "yref": "y domain",
+            "yanchor": "bottom",
+            "text": style.text(label),
+            "showarrow": False,
+            "font": {"size": 11, "color": style.GREY},
+        }
+        for label, start, stop in spans
+    ]
+    figure.update_layout(annotations=[*figure.layout.annotations, *labels])
+
+
+def _shade(figure: go.Figure, spans: Sequence[tuple[float, float]], hue: str) -> None:
+    """Fill stretches of time on every panel; one update, as single ones are slow."""
+    shapes = [
+        {
+            "type": "rect",
+            "x0": start,
+            "x1": stop,
+            "y0": 0,
+            "y1": 1,
+            "xref": f"x{row or ''}",
+            "yref": f"y{row or ''} domain",
+            "fillcolor": hue,
+            "line": {"width": 0},
+            "layer": "below",
+        }
+        for start, stop in spans
+        for row in (None, 2, 3)
+    ]
+    figure.update_layout(shapes=[*figure.layout.shapes, *shapes])
 
 
 def _hold_seconds(steps: pl.DataFrame) -> list[tuple[str, float, float]]:
@@ -148,77 +169,134 @@ def _hold_seconds(steps: pl.DataFrame) -> list[tuple[str, float, float]]:
 
 
 def _shade_missing(figure: go.Figure, frame: pl.DataFrame) -> None:
-    """Hatch the stretches without a state, and say so in the legend."""
+    """Tint the stretches without a state, and say so in the legend."""
     gone = (frame["status"].cast(pl.String) == "missing").to_list()
     seconds = frame["t_s"].to_list()
-    for k, (a, b) in enumerate(style.stretches(gone)):
-        start, stop = seconds[max(a - 1, 0)], seconds[min(b + 1, len(seconds) - 1)]
-        figure.add_vrect(
-            x0=start,
-            x1=stop,
-            fillcolor=style.translucent("#D55E00", 0.13),
-            line_width=0,
-            layer="below",
-            row="all",
-            col=1,
-        )
-        if k == 0:
-            figure.add_trace(
-                go.Scatter(
-                    x=[None],
-                    y=[None],
-                    mode="markers",
-                    name="missing",
-                    marker={
-                        "symbol": "square",
-                        "size": 12,
-                        "color": style.translucent("#D55E00", 0.3),
-                    },
-                ),
-                row=1,
-                col=1,
-            )
+    spans = [
+        (seconds[max(a - 1, 0)], seconds[min(b + 1, len(seconds) - 1)])
+        for a, b in style.stretches(gone)
+    ]
+    if not spans:
+        return
+    _shade(figure, spans[:_MOST_GAPS], style.translucent("#D55E00", 0.13))
+    mark = {"symbol": "square", "size": 12, "color": style.translucent("#D55E00", 0.3)}
+    figure.add_trace(
+        go.Scatter(x=[None], y=[None], mode="markers", name=words.PLOT["missing"], marker=mark),
+        row=1,
+        col=1,
+    )
 
 
-def load_deflection(result: HasTables) -> go.Figure:
-    """Draw the total deflection of every section over the load, holds marked."""
-    frame = result.deflection.filter(pl.col("load").is_not_null(), pl.col("d_m").is_not_null())
-    figure = style.plain()
-    if frame.is_empty():
-        return style.note(figure, "no load channel was read")
-    for k, (name, s_m) in enumerate(sections(frame)):
-        part = _thinned(frame.filter(pl.col("section") == name).sort("time"))
-        hue, label = style.colour(k), f"{style.text(name)} ({s_m:g} m)"
-        figure.add_trace(
-            go.Scatter(
-                x=part["load"],
-                y=part["d_m"],
-                mode="lines",
-                name=label,
-                legendgroup=label,
-                line={"color": hue, "width": 1, "dash": style.dash(k)},
-                opacity=0.6,
-                hoverinfo="skip",
-            )
-        )
-        figure.add_trace(_hold_marks(result.steps, name, hue, label))
-    figure.update_xaxes(title_text="load (%)")
-    figure.update_yaxes(title_text="total deflection (m)")
-    figure.update_layout(height=460)
+def wires(result: HasTables) -> go.Figure:
+    """Draw every wire: what it read, what it would have read by the lidars, and the difference."""
+    channels = table(result, "channels")
+    names = wire_names(channels)
+    real = [name for name in names if name in set(channels["channel"])]
+    rows = len(names) + bool(real)
+    figure = style.panels(max(rows, 1), shared_xaxes=True)
+    if not names:
+        return style.note(figure, words.PLOT["no_draw_wire_real_or_virtual_is_in"])
+    for row, name in enumerate(names, start=1):
+        for k, (channel, label) in enumerate(
+            ((name, words.PLOT["wire"]), (name + virtual.SUFFIX, words.PLOT["by_the_lidars"]))
+        ):
+            part = channels.filter(pl.col("channel") == channel).sort("time")
+            if part.height:
+                figure.add_trace(_wire_line(part, label, k, first=row == 1), row=row, col=1)
+        figure.update_yaxes(title_text=f"{style.text(name)} (m)", row=row, col=1)
+    for k, name in enumerate(real):
+        figure.add_trace(_difference(channels, name, k), row=rows, col=1)
+    if real:
+        figure.update_yaxes(title_text=words.PLOT["lidar_wire"], row=rows, col=1)
+    figure.update_xaxes(title_text=words.PLOT["time"], row=rows, col=1)
+    figure.update_layout(height=130 + 160 * rows)
     return figure
 
 
-def _hold_marks(steps: pl.DataFrame, section: str, hue: str, label: str) -> go.Scatter:
-    part = steps.filter(pl.col("section") == section, pl.col("d_m").is_not_null())
+def _difference(channels: pl.DataFrame, name: str, k: int) -> go.Scatter:
+    wire = from_table(channels, name)
+    own = channels.filter(pl.col("channel") == name + virtual.SUFFIX).sort("time")
+    read = own["value"] if wire is None else pl.Series(wire.at(own["time"].cast(pl.Int64)))
+    part = own.with_columns(value=1e3 * (own["value"] - read.fill_nan(None)))
+    part = style.thinned(part, ["value"], MOST_STATES)
+    label = f"{style.text(name)}, {words.PLOT['difference']}"
     return go.Scatter(
-        x=part["load"],
-        y=part["d_m"],
-        mode="markers",
+        x=part["t_s"],
+        y=part["value"],
+        mode="lines",
+        name=label,
+        line={"color": style.colour(k + 2), "dash": style.dash(k), "width": 1.4},
+        connectgaps=False,
+        hovertemplate="%{x:.2f} s<br>%{y:.1f} mm<extra>" + label + "</extra>",
+    )
+
+
+def wire_names(channels: pl.DataFrame) -> list[str]:
+    """Name the wires of the table ``channels`` that the lidars can speak of."""
+    found = [
+        name.removesuffix(virtual.SUFFIX)
+        for name in channels["channel"].unique(maintain_order=True)
+        if name.endswith(virtual.SUFFIX)
+    ]
+    return list(dict.fromkeys(found))
+
+
+def _wire_line(part: pl.DataFrame, label: str, k: int, *, first: bool) -> go.Scatter:
+    part = style.thinned(part, ["value"], MOST_STATES)
+    return go.Scatter(
+        x=part["t_s"],
+        y=part["value"],
+        mode="lines",
+        line={"color": style.colour(k), "dash": "solid" if k else "dot", "width": 1.8},
         name=label,
         legendgroup=label,
-        showlegend=False,
-        marker={"color": hue, "size": 9},
-        error_y={"type": "data", "array": (_COVERAGE * part["ud_m"]).fill_null(0.0)},
-        text=[style.text(step) for step in part["step"]],
-        hovertemplate="%{text}<br>%{x:.1f} %<br>%{y:.4f} m<extra>" + label + "</extra>",
+        showlegend=first,
+        connectgaps=False,
+        hovertemplate="%{x:.2f} s<br>%{y:.4f} m<extra>" + label + "</extra>",
+    )
+
+
+def other_names(result: HasTables) -> list[str]:
+    """Name the channels that are neither load nor wire: root, strain, inclinometers."""
+    channels = table(result, "channels")
+    wired = set(wire_names(channels))
+    names = channels["channel"].unique(maintain_order=True).to_list()
+    drawn = {"load", *wired, *(name + virtual.SUFFIX for name in wired)}
+    config = configuration(result)
+    drawn |= {str(wire.get("name")) for wire in config.get("wires") or ()}
+    return [name for name in names if name not in drawn]
+
+
+def channels(result: HasTables) -> go.Figure:
+    """Draw every other channel, one panel per unit."""
+    frame = table(result, "channels")
+    names = other_names(result)
+    shown = frame.filter(pl.col("channel").is_in(names))
+    units = shown["unit"].unique(maintain_order=True).to_list()
+    figure = style.panels(max(len(units), 1), shared_xaxes=True)
+    if not names:
+        return style.note(figure, words.PLOT["no_other_channel_was_read"])
+    for row, unit in enumerate(units, start=1):
+        own = shown.filter(pl.col("unit") == unit)
+        for name in own["channel"].unique(maintain_order=True):
+            part = own.filter(pl.col("channel") == name).sort("time")
+            figure.add_trace(_channel_line(part, name, names.index(name)), row=row, col=1)
+        figure.update_yaxes(
+            title_text=f"{words.PLOT['reading']} ({style.text(unit)})", row=row, col=1
+        )
+    figure.update_xaxes(title_text=words.PLOT["time"], row=len(units), col=1)
+    figure.update_layout(height=160 + 180 * len(units))
+    return figure
+
+
+def _channel_line(part: pl.DataFrame, name: str, k: int) -> go.Scatter:
+    part = style.thinned(part, ["value"], MOST_STATES)
+    return go.Scatter(
+        x=part["t_s"],
+        y=part["value"],
+        mode="lines",
+        name=style.text(name),
+        line={"color": style.colour(k), "dash": style.dash(k), "width": 1.5},
+        connectgaps=False,
+        hovertemplate="%{x:.2f} s<br>%{y:.5g}<extra>%{fullData.name}</extra>",
     )

@@ -1,12 +1,11 @@
-"""Figures of the blade in space: its line at every step, and the test seen from above."""
-
-from typing import Any
+"""Figures of the blade in space: its line at every load step."""
 
 import plotly.graph_objects as go
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.plots import style
-from lidar_deflect.plots.source import HasTables, configuration, sections, table
+from lidar_deflect.plots.source import HasTables, table
 
 _NEAR_S = 0.51  # the contour table has states once a second
 
@@ -16,28 +15,29 @@ def deflected_shapes(result: HasTables) -> go.Figure:
     figure = style.panels(2, shared_xaxes=True)
     steps = result.steps.filter(pl.col("x_m").is_not_null())
     if steps.is_empty():
-        return style.note(figure, "no load step was measured")
+        return style.note(figure, words.PLOT["no_load_step_was_measured"])
     contour = table(result, "contour")
     for k, step in enumerate(steps["step"].unique(maintain_order=True)):
         rows = steps.filter(pl.col("step") == step).sort("s_m")
-        line = _line_of(contour, rows)
+        found = line_of(contour, rows)
+        line = rows if found is None else found
         for row, axis in enumerate("xy", start=1):
             _add_line(figure, line, rows, axis, row, step, k)
-    figure.update_xaxes(title_text="z (m)", row=2, col=1)
-    figure.update_yaxes(title_text="x (m)", row=1, col=1)
-    figure.update_yaxes(title_text="y (m)", row=2, col=1)
+    figure.update_xaxes(title_text=words.PLOT["z"], row=2, col=1)
+    figure.update_yaxes(title_text=words.PLOT["x"], row=1, col=1)
+    figure.update_yaxes(title_text=words.PLOT["y"], row=2, col=1)
     figure.update_layout(height=560)
     return figure
 
 
-def _line_of(contour: pl.DataFrame, rows: pl.DataFrame) -> pl.DataFrame:
-    """Blade line nearest to the middle of a step; its sections where no line was written."""
+def line_of(contour: pl.DataFrame, rows: pl.DataFrame) -> pl.DataFrame | None:
+    """Return the blade line nearest to the middle of a step; None where none was written."""
     known = contour.filter(pl.col("x_m").is_not_null())
-    if known.height:
+    if known.height and rows.height:
         off = (known["t_s"] - rows["t_s"][0]).abs()
         if float(off.min() or 0.0) < _NEAR_S:
             return known.filter(off == off.min()).sort("s_m")
-    return rows
+    return None
 
 
 def _add_line(
@@ -73,7 +73,7 @@ def _add_line(
             name=label,
             legendgroup=label,
             showlegend=False,
-            marker={"color": hue, "size": 8},
+            marker={"color": hue, "size": 8, "symbol": style.symbol(k)},
             text=[style.text(name) for name in rows["section"]],
             hovertemplate="%{text}<br>z %{x:.3f} m<br>"
             + axis
@@ -83,62 +83,4 @@ def _add_line(
         ),
         row=row,
         col=1,
-    )
-
-
-def plan(result: HasTables) -> go.Figure:
-    """Draw the test seen from above: sections, lidars, anchors of the wires."""
-    figure = style.plain()
-    steps = result.steps.filter(pl.col("x_m").is_not_null())
-    for k, (name, s_m) in enumerate(sections(steps)):
-        rows = steps.filter(pl.col("section") == name).sort("time")
-        figure.add_trace(
-            go.Scatter(
-                x=rows["z_m"],
-                y=rows["x_m"],
-                mode="lines+markers",
-                name=f"{style.text(name)} ({s_m:g} m)",
-                line={"color": style.colour(k), "dash": "dot", "width": 1.5},
-                marker={"size": 8},
-                text=[style.text(step) for step in rows["step"]],
-                hovertemplate="%{text}<br>z %{x:.2f} m<br>x %{y:.2f} m",
-            )
-        )
-    config = configuration(result)
-    _add_places(figure, "lidar", "square", _places(config.get("lidars"), "id", "position_m"))
-    _add_places(figure, "wire anchor", "x", _places(config.get("wires"), "name", "anchor_m"))
-    if not figure.data:
-        return style.note(figure, "nothing has a place")
-    figure.update_xaxes(title_text="z, along the blade (m)")
-    figure.update_yaxes(title_text="x (m)", scaleanchor="x", scaleratio=1)
-    figure.update_layout(height=460)
-    return figure
-
-
-def _places(entries: Any, name: str, place: str) -> list[tuple[str, float, float]]:
-    """Name, z and x of the configured things that have a place."""
-    return [
-        (str(entry.get(name, "")), float(entry[place][2]), float(entry[place][0]))
-        for entry in entries or ()
-        if entry.get(place)
-    ]
-
-
-def _add_places(
-    figure: go.Figure, kind: str, symbol: str, places: list[tuple[str, float, float]]
-) -> None:
-    if not places:
-        return
-    names, z, x = zip(*places, strict=True)
-    figure.add_trace(
-        go.Scatter(
-            x=z,
-            y=x,
-            mode="markers+text",
-            name=kind,
-            marker={"symbol": symbol, "size": 11, "color": style.GREY},
-            text=[style.text(name) for name in names],
-            textposition="bottom center",
-            hovertemplate="%{text}<br>z %{x:.2f} m<br>x %{y:.2f} m<extra></extra>",
-        )
     )

@@ -1,6 +1,6 @@
 """What figures are drawn from: any object that has the tables of a result."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
 import polars as pl
@@ -36,6 +36,23 @@ def configuration(result: HasTables) -> Mapping[str, Any]:
         return {}
     mapping: Mapping[str, Any] = found if isinstance(found, Mapping) else found.model_dump()
     return mapping
+
+
+def poses_of(result: HasTables) -> list[Mapping[str, Any]]:
+    """Return the entries ``[[lidars]]`` of a result's calibration; none where it has none."""
+    found = getattr(result, "calibration", None)
+    if found is None:
+        return []
+    document = found if isinstance(found, Mapping) else found.to_dict()
+    return [entry for entry in document.get("lidars", ()) if "world_from_sensor" in entry]
+
+
+def some(things: Sequence[Any], most: int) -> list[Any]:
+    """Pick at most `most` things evenly, the last one always among them."""
+    if len(things) <= most:
+        return list(things)
+    places = {round(k * (len(things) - 1) / (most - 1)) for k in range(most)}
+    return [things[k] for k in sorted(places)]
 
 
 def sections(frame: pl.DataFrame) -> list[tuple[str, float]]:

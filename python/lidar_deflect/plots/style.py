@@ -3,12 +3,15 @@
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
 import plotly.graph_objects as go
+import polars as pl
 from plotly.subplots import make_subplots
 
 # Okabe and Ito's palette without its yellow and black, which one of the two backgrounds swallows.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D46", "#7F7F7F")
 DASHES = ("solid", "dash", "dot", "dashdot")
+SYMBOLS = ("circle", "square", "diamond", "triangle-up", "cross", "x", "triangle-down", "star")
 GREY = "#808080"
 FAINT = "rgba(128,128,128,0.14)"
 GRID = "rgba(128,128,128,0.25)"
@@ -21,6 +24,9 @@ MODEBAR = {
     "activecolor": GREY,
     "remove": ["sendChartToCloud", "lasso", "select"],
 }
+
+COVERAGE = 1.96
+"""Half-width of a 95 % interval of a normal distribution, in standard uncertainties."""
 
 STATUS_MARKS = {
     "degraded": ("#E69F00", "triangle-up"),
@@ -38,6 +44,11 @@ def colour(index: int) -> str:
 def dash(index: int) -> str:
     """Return the dash of the n-th thing: it changes when the colours start again."""
     return DASHES[index // len(COLOURS) % len(DASHES)]
+
+
+def symbol(index: int) -> str:
+    """Return the mark of the n-th thing: colour is never the only difference."""
+    return SYMBOLS[index % len(SYMBOLS)]
 
 
 def translucent(hex_colour: str, alpha: float) -> str:
@@ -70,7 +81,13 @@ def finish(figure: go.Figure) -> go.Figure:
         modebar=MODEBAR,
         hovermode="closest",
     )
-    axis = {"gridcolor": GRID, "zerolinecolor": GREY, "zerolinewidth": 1, "ticks": "outside"}
+    axis: dict[str, Any] = {
+        "gridcolor": GRID,
+        "zerolinecolor": GREY,
+        "zerolinewidth": 1,
+        "ticks": "outside",
+    }
+    axis |= {"title": {"font": {"size": 13}, "standoff": 8}}
     figure.update_xaxes(**axis, automargin=True)
     figure.update_yaxes(**axis, automargin=True)
     return figure
@@ -100,3 +117,26 @@ def stretches(mask: Sequence[bool]) -> list[tuple[int, int]]:
         elif value:
             found.append((place, place))
     return found
+
+
+def thinned(frame: pl.DataFrame, columns: Sequence[str], most: int) -> pl.DataFrame:
+    """Keep about `most` rows of a series: of every stretch those with the extremes of each column.
+
+    So no peak is lost, whatever the width of the screen. Rows without a value keep their gap.
+    """
+    if frame.height <= most:
+        return frame
+    buckets = max(most // (2 * len(columns) + 1), 1)
+    place = np.arange(frame.height)
+    indexed = pl.DataFrame({"row": place, "bucket": place * buckets // frame.height})
+    indexed = indexed.hstack(frame.select(columns))
+    picks = [pl.col("row").first().alias("first")]
+    for name in columns:
+        value = pl.col(name).cast(pl.Float64)
+        picks.append(pl.col("row").get(value.arg_min().fill_null(0)).alias(f"low {name}"))
+        picks.append(pl.col("row").get(value.arg_max().fill_null(0)).alias(f"high {name}"))
+        gap = pl.col("row").filter(value.is_null()).first()
+        picks.append(gap.alias(f"gap {name}"))
+    kept = indexed.group_by("bucket").agg(picks).drop("bucket")
+    rows = pl.concat([kept[name] for name in kept.columns]).drop_nulls().unique().sort()
+    return frame[rows]

@@ -6,13 +6,16 @@
 
 mod envelope;
 
-use crate::time::{TimePair, Timestamp};
+use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 use envelope::Envelope;
 
 /// A device clock within this of the host's arrival times counts as UTC.
 pub const UTC_WITHIN_NS: i64 = 20_000_000;
 /// So many bins of the envelope must be near the host's time; the rest may have met a stalled host.
 const UTC_SHARE: f64 = 0.95;
+/// A stamp of this and so many nanoseconds counts from the last pulse of a second: of clocks that follow a
+/// pulse per second and know no date.
+pub const SINCE_PULSE: i64 = -(1 << 61);
 /// Jumps beyond so many join the segment before: such a clock is broken anyway.
 const MAX_SEGMENTS: usize = 1000;
 
@@ -38,8 +41,11 @@ impl Unroller {
         let expected = self
             .anchor
             .map_or(host, |anchor| anchor.device + (host - anchor.host));
-        let Some(wrap_ns) = self.wrap_ns else {
-            return Timestamp(stamp_ns);
+        let is_pulsed = (SINCE_PULSE..SINCE_PULSE + NANOS_PER_SECOND).contains(&stamp_ns);
+        let (wrap_ns, stamp_ns) = match self.wrap_ns {
+            None if is_pulsed => (NANOS_PER_SECOND, stamp_ns - SINCE_PULSE),
+            None => return Timestamp(stamp_ns),
+            Some(wrap_ns) => (wrap_ns, stamp_ns),
         };
         let ahead_ns = (i128::from(stamp_ns) - i128::from(expected.0)).rem_euclid(wrap_ns.into());
         let ahead_ns = ahead_ns as i64; // below wrap_ns
@@ -201,6 +207,19 @@ mod tests {
         let hour = Timestamp(START.0 - past_hour);
         let stamp = NANOS_PER_HOUR - 1_000;
         assert_eq!(unroller.unroll(hour + 2_000, stamp), hour + -1_000);
+    }
+
+    #[test]
+    fn a_stamp_since_the_last_pulse_gets_its_second_from_the_host() {
+        let mut unroller = Unroller::new(None);
+        let second = |stamp_ns: i64| SINCE_PULSE + stamp_ns;
+        let first = unroller.unroll(START + 999_900_000, second(999_000_000));
+        assert_eq!(first, START + 999_000_000);
+        unroller.follow(START + 999_900_000, first);
+        // The host was busy for 0.3 s.
+        let next = unroller.unroll(START + 1_300_000_000, second(500_000));
+        assert_eq!(next, START + 1_000_500_000);
+        assert_eq!(unroller.unroll(START, 77), Timestamp(77));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Point clouds: columns of equal length, one row per echo.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use nalgebra::Point3;
 
@@ -117,22 +118,51 @@ impl<F> PointCloud<F> {
         self.block.push(echo.block);
     }
 
-    /// Appends echoes, column by column.
-    pub fn extend(&mut self, echoes: &[Return]) {
-        self.xyz_m.extend(echoes.iter().map(|echo| echo.xyz_m));
-        self.time_ns.extend(echoes.iter().map(|echo| echo.time.0));
-        self.range_m.extend(echoes.iter().map(|echo| echo.range_m));
+    /// Appends the echoes of another cloud at these places.
+    ///
+    /// # Panics
+    /// Where `places` reaches beyond the other cloud.
+    pub fn extend(&mut self, other: &Self, places: Range<usize>) {
+        self.xyz_m.extend_from_slice(&other.xyz_m[places.clone()]);
+        self.time_ns
+            .extend_from_slice(&other.time_ns[places.clone()]);
+        self.range_m
+            .extend_from_slice(&other.range_m[places.clone()]);
         self.azimuth_rad
-            .extend(echoes.iter().map(|echo| echo.azimuth_rad));
-        self.ring.extend(echoes.iter().map(|echo| echo.ring));
+            .extend_from_slice(&other.azimuth_rad[places.clone()]);
+        self.ring.extend_from_slice(&other.ring[places.clone()]);
         self.intensity
-            .extend(echoes.iter().map(|echo| echo.intensity));
+            .extend_from_slice(&other.intensity[places.clone()]);
         self.return_index
-            .extend(echoes.iter().map(|echo| echo.return_index));
+            .extend_from_slice(&other.return_index[places.clone()]);
         self.return_kind
-            .extend(echoes.iter().map(|echo| echo.return_kind));
-        self.packet.extend(echoes.iter().map(|echo| echo.packet));
-        self.block.extend(echoes.iter().map(|echo| echo.block));
+            .extend_from_slice(&other.return_kind[places.clone()]);
+        self.packet.extend_from_slice(&other.packet[places.clone()]);
+        self.block.extend_from_slice(&other.block[places]);
+    }
+
+    /// The echo at a place.
+    ///
+    /// # Panics
+    /// Where there is none.
+    pub fn get(&self, place: usize) -> Return {
+        Return {
+            xyz_m: self.xyz_m[place],
+            time: Timestamp(self.time_ns[place]),
+            range_m: self.range_m[place],
+            azimuth_rad: self.azimuth_rad[place],
+            ring: self.ring[place],
+            intensity: self.intensity[place],
+            return_index: self.return_index[place],
+            return_kind: self.return_kind[place],
+            packet: self.packet[place],
+            block: self.block[place],
+        }
+    }
+
+    /// The echoes one by one.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Return> + '_ {
+        (0..self.len()).map(|place| self.get(place))
     }
 
     /// Removes all echoes and keeps the memory.

@@ -296,3 +296,30 @@ impl Coded for FitError {
         }
     }
 }
+
+/// Why the beam method has no result.
+#[derive(Debug, Clone, Copy, Error, PartialEq, Eq)]
+pub enum BeamError {
+    /// A load has no equilibrium.
+    #[error("a state of the blade has no equilibrium under the loads that were tried")]
+    Unsettled,
+    /// The unknowns are not fixed by data and prior knowledge together.
+    #[error("the equations of the adjustment are singular")]
+    Singular,
+}
+
+impl Coded for BeamError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Unsettled => "measurement.unsettled",
+            Self::Singular => "measurement.singular",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        Some(match self {
+            Self::Unsettled => "check stiffness and prediction against each other".into(),
+            Self::Singular => "check the covariance of the calibration".into(),
+        })
+    }
+}

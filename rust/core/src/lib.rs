@@ -10,6 +10,7 @@ pub mod time;
 
 pub mod cloud;
 pub mod frame;
+mod simd;
 
 pub mod capture;
 pub mod clock;
@@ -24,6 +25,7 @@ pub mod neighbors;
 pub mod cluster;
 pub mod register;
 
+pub mod beam;
 pub mod blade;
 pub mod paper;
 

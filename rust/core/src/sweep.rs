@@ -50,6 +50,8 @@ pub struct Placed {
     pub time: Timestamp,
     /// Its times and angles.
     pub head: Head,
+    /// Frame that it belongs to, where the sensor counts them.
+    pub frame_id: Option<u32>,
     /// Packets that are missing before it.
     pub lost: u64,
     /// The clock jumped before it: nothing is known of how far the rotor turned.
@@ -64,6 +66,7 @@ pub struct SweepCutter {
     visible_rad: f64,
     open: Option<Open>,
     spare: Vec<PointCloud<Sensor>>,
+    usual: usize, // echoes of the last sweep: as much room is made for the next
 }
 
 /// The sweep that is being filled.
@@ -87,6 +90,7 @@ impl SweepCutter {
             visible_rad: visible_rad.clamp(1e-3, TAU),
             open: None,
             spare: Vec::new(),
+            usual: 0,
         }
     }
 
@@ -166,7 +170,8 @@ impl SweepCutter {
     }
 
     fn open(&mut self, turn: u32, start: Timestamp) {
-        let cloud = self.spare.pop().unwrap_or_default();
+        let mut cloud = self.spare.pop().unwrap_or_default();
+        cloud.reserve(self.usual + self.usual / 16);
         self.open = Some(Open {
             turn,
             cloud,
@@ -180,6 +185,7 @@ impl SweepCutter {
 
     fn close(&mut self, end: Timestamp, out: &mut VecDeque<Sweep>) {
         let Some(open) = self.open.take() else { return };
+        self.usual = open.cloud.len();
         out.push_back(Sweep {
             lidar: self.lidar,
             index: open.turn,
@@ -210,7 +216,7 @@ impl SweepCutter {
                 break;
             }
             let to = decoded.before(from, &packet.head, cut_rad - start_rad);
-            open.cloud.extend(&decoded.returns[from..to]);
+            open.cloud.extend(&decoded.cloud, from..to);
             open.seen_rad += packet
                 .head
                 .seen_rad(from_rad - start_rad, cut_rad - start_rad);
@@ -221,7 +227,7 @@ impl SweepCutter {
             (from, from_rad) = (to, cut_rad);
         }
         if let Some(open) = &mut self.open {
-            open.cloud.extend(&decoded.returns[from..]);
+            open.cloud.extend(&decoded.cloud, from..decoded.cloud.len());
             open.seen_rad += packet
                 .head
                 .seen_rad(from_rad - start_rad, end_rad - start_rad);

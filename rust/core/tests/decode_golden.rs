@@ -76,8 +76,8 @@ fn decode(name: &str) -> (Decoded, Vec<Vec<u8>>) {
 }
 
 fn assert_agrees(decoded: &Decoded, rows: &[Row]) {
-    assert_eq!(decoded.returns.len(), rows.len());
-    for (echo, row) in decoded.returns.iter().zip(rows) {
+    assert_eq!(decoded.cloud.len(), rows.len());
+    for (echo, row) in decoded.cloud.iter().zip(rows) {
         let kind = match echo.return_kind {
             ReturnKind::Strongest => 1,
             ReturnKind::Last => 2,
@@ -143,6 +143,6 @@ fn the_counts_of_a_scan_are_those_of_decoding() {
             }
         }
         let (decoded, _) = decode(name);
-        assert_eq!(tally, (decoded.returns.len(), decoded.merged));
+        assert_eq!(tally, (decoded.cloud.len(), decoded.merged));
     }
 }

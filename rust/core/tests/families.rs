@@ -30,7 +30,7 @@ fn decode(writer: &Writer, payload: &[u8], out: &mut Decoded) {
 /// Metres of one unit of range.
 fn unit_m(id: &str) -> f64 {
     match id {
-        "vlp16" | "vlp16-hires" | "hdl32e" | "hdl64e-s2" | "hdl64e-s3" => 0.002,
+        "vlp16" | "vlp16-hires" | "hdl32e" | "hdl64e-s2" | "hdl64e" => 0.002,
         "xt32m2x" => 0.005,
         _ => 0.004,
     }
@@ -108,7 +108,7 @@ fn check(writer: &Writer, mode: ReturnMode, number: u32, echoes: &[RawEcho]) {
     decode(writer, &payload, &mut out);
     let tally = writer.model.tally(&payload);
     assert_eq!(
-        (out.returns.len(), out.merged),
+        (out.cloud.len(), out.merged),
         (tally.points as usize, u64::from(tally.merged)),
         "{id}"
     );
@@ -123,12 +123,12 @@ fn check(writer: &Writer, mode: ReturnMode, number: u32, echoes: &[RawEcho]) {
         .filter(|(block, channel)| echo(*block, *channel).range != 0)
         .count() as u64;
     assert_eq!(
-        out.returns.len() as u64 + out.merged,
+        out.cloud.len() as u64 + out.merged,
         written,
         "{id} {mode:?}"
     );
-    for found in &out.returns {
-        assert_consistent(id, found);
+    for found in out.cloud.iter() {
+        assert_consistent(id, &found);
         let units = f64::from(found.range_m) / unit_m(id);
         let block = if id == "ft120" {
             0
@@ -169,7 +169,7 @@ fn the_meaning_of_two_returns_does_not_depend_on_their_order() {
             let payload = (writer.encode)(&packet(writer, ReturnMode::Dual, 3, echo));
             let mut out = Decoded::default();
             decode(writer, &payload, &mut out);
-            for found in &out.returns {
+            for found in out.cloud.iter() {
                 let is_far = f64::from(found.range_m) > 6_000.0 * unit_m(writer.model.id());
                 let kind = if is_far {
                     ReturnKind::Last
@@ -178,7 +178,7 @@ fn the_meaning_of_two_returns_does_not_depend_on_their_order() {
                 };
                 assert_eq!(found.return_kind, kind, "{}", writer.model.id());
             }
-            assert!(!out.returns.is_empty());
+            assert!(!out.cloud.is_empty());
         }
     }
 }
@@ -219,10 +219,10 @@ fn ask_everything(
     let tally = model.tally(payload);
     if !matches!(model.id(), "at128") {
         // An encoder outside of all fields of the AT128 is known to its decoder alone.
-        assert_eq!(out.returns.len(), tally.points as usize, "{}", model.id());
+        assert_eq!(out.cloud.len(), tally.points as usize, "{}", model.id());
         assert_eq!(out.merged - merged, u64::from(tally.merged));
     }
-    for echo in &out.returns {
+    for echo in out.cloud.iter() {
         assert!(
             echo.xyz_m.iter().all(|metres| metres.is_finite()),
             "{echo:?}"

@@ -107,7 +107,7 @@ fn every_model_is_named_from_its_packets_alone() {
 fn an_hdl64e_without_a_calibration_is_refused_and_says_how_to_get_one() {
     let writer = writers()
         .into_iter()
-        .find(|w| w.model.id() == "hdl64e-s3")
+        .find(|w| w.model.id() == "hdl64e")
         .unwrap();
     let report = scan(
         &writer,

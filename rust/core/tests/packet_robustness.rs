@@ -52,9 +52,9 @@ fn ask_everything(model: ModelRef, payload: &[u8], out: &mut Decoded) {
     let mut decoder = fitted.decoder;
     decoder.decode(payload, place, out);
     let tally = model.tally(payload);
-    assert_eq!(out.returns.len(), tally.points as usize);
+    assert_eq!(out.cloud.len(), tally.points as usize);
     assert_eq!(out.merged - merged, u64::from(tally.merged));
-    for echo in &out.returns {
+    for echo in out.cloud.iter() {
         assert!(echo.xyz_m.iter().all(|metres| metres.is_finite()));
         assert!(
             (0.0..std::f32::consts::TAU).contains(&echo.azimuth_rad),
@@ -179,7 +179,7 @@ proptest! {
         let place = Place { time: Timestamp(head.device_ns), packet: 3, mean_rate_rad_per_ns: 0.0 };
         model.fit(&[]).unwrap().decoder.decode(&payload, place, &mut out);
         let beams = if is_hires { VLP16_HIRES.beams() } else { VLP16.beams() };
-        let mut returns = out.returns.iter();
+        let mut returns = out.cloud.iter();
         for (number, block) in blocks.iter().enumerate() {
             for (channel, echo) in block.returns.iter().enumerate() {
                 if echo.range == 0 {

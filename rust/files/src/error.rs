@@ -68,7 +68,7 @@ impl Foreign {
             Self::Lz4 => "decompress it first: lz4 -dk FILE",
             Self::Zip | Self::SevenZip => "unpack it and give the captures in it",
             Self::RosBag | Self::Ros2Database | Self::Mcap => {
-                "bags are not read yet: record the sensors' packets with tcpdump"
+                "the Python package and the command line read bags: pip install 'lidar-deflect[ros]'"
             }
             Self::Parquet | Self::Text => {
                 "give a pcap or pcapng, as tcpdump and Wireshark record it"

@@ -173,6 +173,12 @@ fn sensor_models() -> Vec<(&'static str, &'static str)> {
     models.map(|model| (model.id(), model.title())).collect()
 }
 
+/// Id of the sensor model with this name; dashes and capitals do not matter, older names are taken too.
+#[pyfunction]
+fn sensor_id(name: &str) -> Option<&'static str> {
+    packet::model(name).ok().map(packet::Model::id)
+}
+
 /// What is decoded of each model and how that was proven: id, name, how it is recognised, returns,
 /// files of a unit, proof.
 #[pyfunction]
@@ -197,5 +203,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_table, module)?)?;
+    module.add_function(wrap_pyfunction!(sensor_id, module)?)?;
     module.add_function(wrap_pyfunction!(sensor_models, module)?)
 }

@@ -1,7 +1,7 @@
 //! Errors of the core become the exceptions of `lidar_deflect.errors`.
 
 use lidar_deflect_core::error::{
-    CaptureError, ClusterError, Coded, FitError, InvalidValue, ReadError, UnitError,
+    BeamError, CaptureError, ClusterError, Coded, FitError, InvalidValue, ReadError, UnitError,
 };
 use lidar_deflect_core::paper::tip::NoTip;
 use lidar_deflect_core::register::network::NetworkError;
@@ -48,6 +48,7 @@ macro_rules! translate {
 }
 
 translate! {
+    BeamError => "MeasurementError",
     CaptureError => "CaptureError",
     ClusterError => "InvalidValueError",
     FitError => "MeasurementError",

@@ -7,6 +7,7 @@
 #![allow(clippy::needless_pass_by_value)]
 
 mod arrays;
+mod beam;
 mod capture;
 mod cluster;
 mod compute;
@@ -21,6 +22,7 @@ use pyo3::prelude::*;
 /// The compiled part of `lidar_deflect`; private, its public face is the Python package.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    beam::register(module)?;
     capture::register(module)?;
     cluster::register(module)?;
     fit::register(module)?;

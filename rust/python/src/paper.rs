@@ -5,8 +5,10 @@ mod params;
 mod steps;
 
 use lidar_deflect_core::error::InvalidValue;
+use lidar_deflect_core::paper::kept::KeptFrames;
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::Plane;
+use nalgebra::Point3;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyReadonlyArray1};
 use pyo3::prelude::*;
 
@@ -16,6 +18,9 @@ use crate::error::BorderResult;
 use feed::FrameFeed;
 pub use feed::FramePlan;
 pub use params::FrameParams;
+
+/// Memory that frames may fill between the passes: some minutes of a test.
+const KEPT_BYTES: usize = 64 << 20;
 
 /// Adds this file's classes to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -30,17 +35,21 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
 #[pyclass(module = "lidar_deflect._native")]
 pub struct DistancePass {
     feed: FrameFeed,
+    sensors_m: Vec<Point3<f64>>,
     ranges: DistanceRanges,
+    kept: KeptFrames,
 }
 
 #[pymethods]
 impl DistancePass {
     #[new]
     fn new(py: Python<'_>, plan: &FramePlan) -> BorderResult<Self> {
-        let ranges = DistanceRanges::new(plan.sensors_m().len());
+        let sensors_m = plan.sensors_m();
         Ok(Self {
             feed: FrameFeed::open(py, plan)?,
-            ranges,
+            ranges: DistanceRanges::new(sensors_m.len()),
+            sensors_m,
+            kept: KeptFrames::new(KEPT_BYTES),
         })
     }
 
@@ -53,10 +62,11 @@ impl DistancePass {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> BorderResult<bool> {
-        let frames = self.feed.frames(py, count, progress.as_ref())?;
-        let (ranges, sensors) = (&mut self.ranges, self.feed.sensors_m());
-        compute(py, threads, || ranges.extend(&frames, sensors))?;
-        Ok(!frames.is_empty())
+        let frames = self.feed.frames(py, count, threads, progress.as_ref())?;
+        self.ranges.extend(&frames, &self.sensors_m);
+        let more = !frames.is_empty();
+        self.kept.extend(frames);
+        Ok(more)
     }
 
     /// Smallest and largest distance of each lidar, (lidars, 2), metres; NaN without any.
@@ -73,18 +83,22 @@ impl DistancePass {
 /// Second pass: contour curves of every frame.
 #[pyclass(module = "lidar_deflect._native")]
 pub struct ContourPass {
-    feed: FrameFeed,
+    kept: KeptFrames,
+    feed: Option<FrameFeed>, // none where the first pass kept all frames
+    lidars: usize,
     series: ContourSeries,
 }
 
 #[pymethods]
 impl ContourPass {
     #[new]
-    #[pyo3(signature = (plan, params, *, sample_every, sample_points))]
+    /// Takes over the frames that the first pass of the same plan kept.
+    #[pyo3(signature = (plan, params, first_pass, *, sample_every, sample_points))]
     fn new(
         py: Python<'_>,
         plan: &FramePlan,
         params: &FrameParams,
+        first_pass: &mut DistancePass,
         sample_every: usize,
         sample_points: usize,
     ) -> BorderResult<Self> {
@@ -93,8 +107,12 @@ impl ContourPass {
             points: sample_points,
         };
         let series = ContourSeries::new(params.core(plan.sensors_m()), sampling);
+        let kept = std::mem::replace(&mut first_pass.kept, KeptFrames::new(0));
+        let open = |first| FrameFeed::open_from(py, plan, first);
         Ok(Self {
-            feed: FrameFeed::open(py, plan)?,
+            feed: kept.next().map(open).transpose()?,
+            kept,
+            lidars: plan.sensors_m().len(),
             series,
         })
     }
@@ -108,7 +126,10 @@ impl ContourPass {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> BorderResult<bool> {
-        let frames = self.feed.frames(py, count, progress.as_ref())?;
+        let mut frames = self.kept.take(count);
+        if let Some(feed) = self.feed.as_mut().filter(|_| frames.is_empty()) {
+            frames = feed.frames(py, count, threads, progress.as_ref())?;
+        }
         let series = &mut self.series;
         compute(py, threads, || series.extend(&frames))?;
         Ok(!frames.is_empty())
@@ -136,7 +157,7 @@ impl ContourPass {
         Bound<'py, PyArray2<bool>>,
         Bound<'py, PyArray2<u32>>,
     )> {
-        let lidars = self.feed.sensors_m().len();
+        let lidars = self.lidars;
         Ok((
             arrays::table(py, self.series.uses(|used| used.present), lidars)?,
             arrays::table(py, self.series.uses(|used| used.lost), lidars)?,

@@ -23,12 +23,14 @@ mod link;
 mod udp;
 
 mod assembler;
+mod batch;
 mod reader;
 
 mod frame;
 mod writer;
 
 pub use assembler::{Assembler, Found};
+pub use batch::DatagramBatch;
 pub use facts::{CaptureFacts, CaptureWarning, Format, FragmentFacts};
 pub use reader::DatagramReader;
 pub use record::{MAX_RECORD_LEN, Record, RecordReader};

@@ -1,5 +1,6 @@
 //! What did not arrive, what arrived twice or late, and what a limited field of view never sent.
 
+pub mod cycle;
 pub mod order;
 pub mod view;
 

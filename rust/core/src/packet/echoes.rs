@@ -22,7 +22,31 @@ pub struct RawEcho {
 pub type Meanings = [Option<ReturnKind>; MOST];
 
 /// Judges the echoes of one shot; gives their meanings and how many were merged into others.
+#[inline]
 pub fn judge(mode: ReturnMode, echoes: &[RawEcho]) -> (Meanings, u32) {
+    match echoes {
+        [first, second] => judge_pair(mode, [*first, *second]),
+        _ => judge_several(mode, echoes),
+    }
+}
+
+/// The same for the two echoes that most sensors give, without loops.
+#[inline]
+fn judge_pair(mode: ReturnMode, pair: [RawEcho; 2]) -> (Meanings, u32) {
+    match pair.map(|echo| echo.range) {
+        [0, 0] => ([None; MOST], 0),
+        [_, 0] => ([Some(only_kind(mode, 0)), None, None], 0),
+        [0, _] => ([None, Some(only_kind(mode, 1)), None], 0),
+        [first, second] if first == second => ([Some(ReturnKind::Merged), None, None], 1),
+        [first, second] => {
+            let (near, far) = if first < second { (0, 1) } else { (1, 0) };
+            let kind = |place| Some(place_kind(mode, &pair, near, far, place));
+            ([kind(0), kind(1), None], 0)
+        }
+    }
+}
+
+fn judge_several(mode: ReturnMode, echoes: &[RawEcho]) -> (Meanings, u32) {
     let mut meanings: Meanings = [None; MOST];
     let mut merged = 0;
     let mut distinct = [0_usize; MOST];
@@ -63,16 +87,27 @@ fn label(mode: ReturnMode, echoes: &[RawEcho], distinct: &[usize], meanings: &mu
         return;
     };
     for place in distinct {
-        let kind = if mode == ReturnMode::StrongestSecond {
-            by_brightness(echoes, near, far, *place)
-        } else if *place == far {
-            far_kind(mode)
-        } else if *place == near {
-            near_kind(mode)
-        } else {
-            ReturnKind::Strongest
-        };
+        let kind = place_kind(mode, echoes, near, far, *place);
         meanings[*place].get_or_insert(kind);
+    }
+}
+
+/// Meaning of the echo at `place` among those of which the ones at `near` and `far` are outermost.
+fn place_kind(
+    mode: ReturnMode,
+    echoes: &[RawEcho],
+    near: usize,
+    far: usize,
+    place: usize,
+) -> ReturnKind {
+    if mode == ReturnMode::StrongestSecond {
+        by_brightness(echoes, near, far, place)
+    } else if place == far {
+        far_kind(mode)
+    } else if place == near {
+        near_kind(mode)
+    } else {
+        ReturnKind::Strongest
     }
 }
 
@@ -162,5 +197,23 @@ mod tests {
         assert_eq!(triple, ([Some(Strongest), Some(First), Some(Last)], 0));
         let two = kinds(ReturnMode::Triple, &[(5, 9), (5, 9), (8, 1)]);
         assert_eq!(two, ([Some(Merged), None, Some(Last)], 1));
+    }
+    #[test]
+    fn two_echoes_are_judged_as_any_number_is() {
+        let modes = [
+            ReturnMode::Dual,
+            ReturnMode::FirstLast,
+            ReturnMode::FirstStrongest,
+            ReturnMode::StrongestSecond,
+            ReturnMode::Last,
+        ];
+        for (mode, code) in modes.iter().flat_map(|m| (0..256).map(move |c| (*m, c))) {
+            let echo = |bits: u16| RawEcho {
+                range: bits % 4,
+                intensity: (bits / 4 % 4) as u8,
+            };
+            let pair = [echo(code), echo(code / 16)];
+            assert_eq!(judge_pair(mode, pair), judge_several(mode, &pair));
+        }
     }
 }

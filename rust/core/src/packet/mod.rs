@@ -7,17 +7,24 @@
 pub mod aim;
 pub mod beams;
 pub mod echoes;
+pub mod frames;
 pub mod hesai;
+pub mod leishen;
+pub mod livox;
 pub mod ouster;
+pub mod points;
 pub mod proof;
 pub mod robosense;
 pub mod unit;
 pub mod velodyne;
+pub mod writer;
 
 use crate::angle::{Arc, wrap_turn};
-use crate::cloud::Return;
+use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, UnitError};
+use crate::frame::Sensor;
+use crate::loss::cycle::Restarts;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
@@ -56,8 +63,21 @@ pub static MODELS: &[ModelRef] = &[
     &ouster::bare::OS1,
     &ouster::bare::OS2,
     &ouster::bare::OSDOME,
-    &robosense::helios::HELIOS_32,
+    &ouster::bare::PRODUCTS[0],
+    &ouster::bare::PRODUCTS[1],
+    &ouster::bare::PRODUCTS[2],
+    &ouster::bare::PRODUCTS[3],
+    &ouster::bare::PRODUCTS[4],
+    &ouster::bare::PRODUCTS[5],
+    &ouster::bare::PRODUCTS[6],
+    &ouster::bare::PRODUCTS[7],
+    &ouster::bare::PRODUCTS[8],
+    &ouster::bare::PRODUCTS[9],
+    &ouster::bare::PRODUCTS[10],
+    &ouster::bare::PRODUCTS[11],
+    &ouster::bare::PRODUCTS[12],
     &robosense::helios::HELIOS_16P,
+    &robosense::helios::HELIOS_32,
     &robosense::helios::HELIOS_32_31DEG,
     &robosense::helios::HELIOS_32_26DEG,
     &robosense::rs::RS_16,
@@ -72,6 +92,50 @@ pub static MODELS: &[ModelRef] = &[
     &robosense::ruby::PLUS_48,
     &robosense::airy::AIRY,
     &robosense::airy::FAIRY,
+    &leishen::products::MODELS[0],
+    &leishen::products::MODELS[1],
+    &leishen::products::MODELS[2],
+    &leishen::products::MODELS[3],
+    &leishen::products::MODELS[4],
+    &leishen::products::MODELS[5],
+    &leishen::products::MODELS[6],
+    &leishen::products::MODELS[7],
+    &leishen::products::MODELS[8],
+    &leishen::products::MODELS[9],
+    &leishen::products::MODELS[10],
+    &leishen::products::MODELS[11],
+    &leishen::products::MODELS[12],
+    &leishen::products::MODELS[13],
+    &leishen::products::MODELS[14],
+    &leishen::products::MODELS[15],
+    &leishen::products::MODELS[16],
+    &leishen::products::MODELS[17],
+    &leishen::products::MODELS[18],
+    &leishen::products::MODELS[19],
+    &leishen::mirror::MODELS[0],
+    &leishen::mirror::MODELS[1],
+    &leishen::mirror::MODELS[2],
+    &leishen::mirror::MODELS[3],
+    &leishen::mirror::MODELS[4],
+    &leishen::mirror::MODELS[5],
+    &leishen::mirror::MODELS[6],
+    &leishen::mirror::MODELS[7],
+    &robosense::solid::sensor::M1,
+    &robosense::solid::sensor::M1_PLUS,
+    &robosense::solid::sensor::M2,
+    &robosense::solid::sensor::M3,
+    &robosense::solid::sensor::MX,
+    &robosense::solid::sensor::E1,
+    &robosense::solid::sensor::EMX,
+    &robosense::solid::sensor::EM4,
+    &livox::sensor::MID_40,
+    &livox::sensor::MID_70,
+    &livox::sensor::AVIA,
+    &livox::sensor::HORIZON,
+    &livox::sensor::TELE_15,
+    &livox::sensor::MID_360,
+    &livox::sensor::HAP,
+    &points::POINTS,
 ];
 
 /// What the library must know of one sensor model.
@@ -99,6 +163,22 @@ pub trait Model: Sync + std::fmt::Debug {
     /// Whether all data packets of a stream, taken together, may be of this model.
     fn suits(&self, _packets: &[&[u8]]) -> bool {
         true
+    }
+
+    /// What all data packets of a stream, taken together, leave open although this model is taken.
+    fn doubt(&self, _packets: &[&[u8]]) -> Option<String> {
+        None
+    }
+
+    /// What a data packet tells beside its points that a user should know.
+    fn remarks(&self, _payload: &[u8]) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The model with the timing that all data packets of a stream, taken together, show; `None` where it
+    /// is this one's.
+    fn as_sent(&self, _packets: &[&[u8]]) -> Option<ModelRef> {
+        None
     }
 
     /// Whether `payload` has the layout of a data packet, whatever its identifying bytes say: for
@@ -129,6 +209,21 @@ pub trait Model: Sync + std::fmt::Debug {
     fn sequence_wrap(&self) -> Option<i64> {
         let bits = self.counting().sequence_bits;
         bits.map(|bits| 1_i64 << bits.min(62))
+    }
+
+    /// How the sequence number starts again with every frame, where it does.
+    fn restarts(&self) -> Option<Restarts> {
+        None
+    }
+
+    /// Whether a rotor turns the beams. Others send frame after frame: one frame counts as one turn.
+    fn has_rotor(&self) -> bool {
+        true
+    }
+
+    /// Number of the frame that a data packet belongs to, where the sensor counts them.
+    fn frame_id(&self, _payload: &[u8]) -> Option<u32> {
+        None
     }
 
     /// Models of the single units that `files` describe, where packets mean nothing without: those that are
@@ -269,13 +364,15 @@ pub struct LeftOut {
     pub after_rad: f64,
     /// Width of the gap.
     pub width_rad: f64,
+    /// No time passes in it: a mirror starts anew.
+    pub is_instant: bool,
 }
 
 impl Head {
     /// The same with the time over a gap from the rotation rate over many packets, which is known
     /// better than the rate within one.
     pub fn paced(mut self, mean_rate_rad_per_ns: f64) -> Self {
-        if let Some(gap) = self.left_out
+        if let Some(gap) = self.left_out.filter(|gap| !gap.is_instant)
             && self.rate_rad_per_ns > 0.0
             && mean_rate_rad_per_ns > 0.0
         {
@@ -371,7 +468,7 @@ pub struct Place {
 #[derive(Debug, Default)]
 pub struct Decoded {
     /// The returns.
-    pub returns: Vec<Return>,
+    pub cloud: PointCloud<Sensor>,
     /// Encoder azimuth of each return's shot, before the channel's own offset: what sweeps are cut by.
     pub encoder_rad: Vec<f32>,
     /// Second returns that repeat the first and were merged into it.
@@ -394,7 +491,7 @@ impl Decoded {
 
     /// Empties the columns and keeps their memory; the counts go on.
     pub fn clear(&mut self) {
-        self.returns.clear();
+        self.cloud.clear();
         self.encoder_rad.clear();
     }
 }
@@ -408,12 +505,49 @@ pub trait Decoder: Send + Sync {
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded);
 }
 
-/// The model with this id.
+/// Other names of models, in the spelling of [`squeezed`].
+const ALIASES: &[(&str, &str)] = &[
+    ("pandar128e3x", "pandar128"),
+    ("pandar90e3x", "pandar90"),
+    ("pandar40m", "pandar40p"),
+    ("pandarqt64", "qt64"),
+    ("pandarqt", "qt64"),
+    ("pandarqt128", "qt128"),
+    ("pandarxt16", "xt16"),
+    ("pandarxt32", "xt32"),
+    ("xt32m", "xt32m2x"),
+    ("pandarat128", "at128"),
+    ("hdl64es3", "hdl64e"),
+    ("hdl64", "hdl64e"),
+    ("hdl32", "hdl32e"),
+    ("vlp16lite", "puck-lite"),
+    ("puckhires", "vlp16-hires"),
+    ("alphaprime", "vls128"),
+    ("helios5515", "helios32"),
+    ("helios1615", "helios32-31deg"),
+    ("rslidar16", "rs16"),
+    ("rslidar32", "rs32"),
+    ("rsbpearl", "bpearl"),
+    ("rshelios16p", "helios16p"),
+    ("rshelios", "helios32"),
+    ("rubylite", "ruby-80"),
+];
+
+/// A name without the dashes, spaces and capitals in which spellings differ.
+fn squeezed(name: &str) -> String {
+    let kept = name.chars().filter(char::is_ascii_alphanumeric);
+    kept.map(|c| c.to_ascii_lowercase()).collect()
+}
+
+/// The model with this id; dashes and capitals do not matter, and older names are taken as well.
 ///
 /// # Errors
 /// [`InvalidValue`] that lists the known ids.
 pub fn model(id: &str) -> Result<ModelRef, InvalidValue> {
-    let known = MODELS.iter().find(|model| model.id() == id);
+    let name = squeezed(id);
+    let alias = ALIASES.iter().find(|(other, _)| *other == name);
+    let name = alias.map_or(name, |(_, id)| squeezed(id));
+    let known = MODELS.iter().find(|model| squeezed(model.id()) == name);
     known.copied().ok_or_else(|| InvalidValue {
         name: "sensor model",
         expected: MODELS.iter().map(|m| m.id()).collect::<Vec<_>>().join(", "),
@@ -455,5 +589,20 @@ mod tests {
             assert!(one.candidates().iter().all(|id| model(id).is_ok()));
         }
         assert!(model("vlp61").unwrap_err().expected.contains("vlp16"));
+    }
+
+    #[test]
+    fn spellings_and_older_names_are_taken_and_never_clash() {
+        for (place, one) in MODELS.iter().enumerate() {
+            let is_same = |other: &&ModelRef| squeezed(other.id()) == squeezed(one.id());
+            assert_eq!(MODELS[..place].iter().find(is_same).map(|m| m.id()), None);
+            assert_eq!(model(&one.id().to_uppercase()).unwrap().id(), one.id());
+        }
+        for (alias, id) in ALIASES {
+            assert!(MODELS.iter().all(|model| squeezed(model.id()) != *alias));
+            assert_eq!(model(alias).unwrap().id(), *id);
+        }
+        assert_eq!(model("helios-16p").unwrap().id(), "helios16p");
+        assert_eq!(model("RS-16").unwrap().id(), "rs16");
     }
 }

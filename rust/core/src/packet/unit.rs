@@ -2,6 +2,7 @@
 //! the capture, or gathered from the packets themselves.
 
 use super::Decoder;
+use crate::capture::DatagramReader;
 use crate::error::UnitError;
 
 /// A file that describes one unit. What it is, its content tells.
@@ -69,6 +70,23 @@ impl UnitFile {
             found: found.into(),
         }
     }
+}
+
+/// What `take` takes of a file: of the file itself, or of the first datagram of a capture that it takes.
+pub fn find<T>(file: &UnitFile, take: impl Fn(&[u8]) -> Option<T>) -> Option<T> {
+    /// A capture has one a second.
+    const MOST_DATAGRAMS: usize = 1_000_000;
+    if let Some(taken) = take(&file.content) {
+        return Some(taken);
+    }
+    let mut reader = DatagramReader::new(&file.content[..]).ok()?;
+    for _ in 0..MOST_DATAGRAMS {
+        let datagram = reader.next().ok()??;
+        if let Some(taken) = take(datagram.payload) {
+            return Some(taken);
+        }
+    }
+    None
 }
 
 /// Where the angles of a decoder come from.

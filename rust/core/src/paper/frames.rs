@@ -61,8 +61,6 @@ pub struct Frame {
 /// order of time; frames come out when no later sweep can be nearer.
 #[derive(Debug)]
 pub struct FrameAssembler {
-    poses: Vec<WorldFromSensor>,
-    pass: PassThrough,
     period_ns: i64,
     next: Timestamp,
     waiting: Vec<VecDeque<(Timestamp, Share)>>,
@@ -70,16 +68,11 @@ pub struct FrameAssembler {
 }
 
 impl FrameAssembler {
-    /// Frames at `first`, `first + period` and so on, of lidars with these poses.
+    /// Frames at `first`, `first + period` and so on, of so many lidars.
     ///
     /// # Errors
     /// [`InvalidValue`] where the period is not positive.
-    pub fn new(
-        poses: Vec<WorldFromSensor>,
-        pass: PassThrough,
-        first: Timestamp,
-        period_ns: i64,
-    ) -> Result<Self, InvalidValue> {
+    pub fn new(lidars: usize, first: Timestamp, period_ns: i64) -> Result<Self, InvalidValue> {
         if period_ns <= 0 {
             return Err(InvalidValue {
                 name: "rate_hz",
@@ -87,10 +80,8 @@ impl FrameAssembler {
                 found: format!("a period of {period_ns} ns"),
             });
         }
-        let waiting = vec![VecDeque::new(); poses.len()];
+        let waiting = vec![VecDeque::new(); lidars];
         Ok(Self {
-            poses,
-            pass,
             period_ns,
             next: first,
             waiting,
@@ -98,11 +89,9 @@ impl FrameAssembler {
         })
     }
 
-    /// Takes the next sweep of its lidar.
-    pub fn push(&mut self, sweep: &Sweep) {
-        let middle = sweep.start + (sweep.end - sweep.start) / 2;
-        let share = share_of(sweep, &self.poses[sweep.lidar], &self.pass);
-        self.waiting[sweep.lidar].push_back((middle, share));
+    /// Takes what a lidar's next sweep gives, and the middle of that sweep.
+    pub fn push(&mut self, lidar: usize, middle: Timestamp, share: Share) {
+        self.waiting[lidar].push_back((middle, share));
     }
 
     /// No more sweeps will come: what waits may go out.
@@ -155,7 +144,12 @@ fn nearest(queue: &mut VecDeque<(Timestamp, Share)>, time: Timestamp, reach_ns: 
         .unwrap_or_default()
 }
 
-fn share_of(sweep: &Sweep, world_from_sensor: &WorldFromSensor, pass: &PassThrough) -> Share {
+/// What a sweep gives to a frame, and its middle.
+pub fn share_of(
+    sweep: &Sweep,
+    world_from_sensor: &WorldFromSensor,
+    pass: &PassThrough,
+) -> (Timestamp, Share) {
     let mut share = Share {
         present: true,
         ..Share::default()
@@ -179,7 +173,7 @@ fn share_of(sweep: &Sweep, world_from_sensor: &WorldFromSensor, pass: &PassThrou
         seen.is_none_or(|s| gap.from <= s.to + NEAR_BLADE_NS && s.from <= gap.to + NEAR_BLADE_NS)
     };
     share.lost_on_blade = sweep.gaps.iter().any(overlaps);
-    share
+    (sweep.start + (sweep.end - sweep.start) / 2, share)
 }
 
 #[cfg(test)]
@@ -221,17 +215,22 @@ mod tests {
     }
 
     fn assembler(lidars: usize) -> FrameAssembler {
+        FrameAssembler::new(lidars, Timestamp(0), PERIOD).unwrap()
+    }
+
+    fn push(frames: &mut FrameAssembler, sweep: &Sweep) {
         let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::new(0.0, 0.0, 80.0));
         let pass = PassThrough::new([1.5, -1.0, 70.0], [9.0, 1.0, 90.0]).unwrap();
-        FrameAssembler::new(vec![pose; lidars], pass, Timestamp(0), PERIOD).unwrap()
+        let (middle, share) = share_of(sweep, &pose, &pass);
+        frames.push(sweep.lidar, middle, share);
     }
 
     #[test]
     fn the_nearest_sweep_of_each_lidar_makes_the_frame() {
         let mut frames = assembler(2);
         for k in 0..4 {
-            frames.push(&sweep(0, k * PERIOD + 10_000_000, vec![]));
-            frames.push(&sweep(1, k * PERIOD - 30_000_000, vec![]));
+            push(&mut frames, &sweep(0, k * PERIOD + 10_000_000, vec![]));
+            push(&mut frames, &sweep(1, k * PERIOD - 30_000_000, vec![]));
         }
         let first = frames.pop().unwrap();
         assert_eq!(first.time, Timestamp(0));
@@ -260,9 +259,9 @@ mod tests {
     #[test]
     fn a_silent_lidar_is_absent_and_does_not_hold_up_the_others() {
         let mut frames = assembler(2);
-        frames.push(&sweep(1, 0, vec![]));
+        push(&mut frames, &sweep(1, 0, vec![]));
         for k in 0..30 {
-            frames.push(&sweep(0, k * PERIOD, vec![]));
+            push(&mut frames, &sweep(0, k * PERIOD, vec![]));
         }
         let present: Vec<bool> = std::iter::from_fn(|| frames.pop())
             .map(|frame| frame.shares[1].present)
@@ -280,7 +279,7 @@ mod tests {
         let far = sweep(0, 0, vec![gap(30_000_000, 31_300_000)]);
         for (sweep, expected) in [(near, true), (far, false)] {
             let mut frames = assembler(1);
-            frames.push(&sweep);
+            push(&mut frames, &sweep);
             assert_eq!(frames.pop().unwrap().shares[0].lost_on_blade, expected);
         }
     }

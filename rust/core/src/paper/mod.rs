@@ -4,7 +4,7 @@
 //! |---|---|
 //! | 2-4 ground, rotation, yaw | [`crate::register`] |
 //! | 5 pass-through | [`passthrough`] |
-//! | frames on the common clock | [`frames`] |
+//! | frames on the common clock | [`frames`], out of datagrams [`reader`] |
 //! | 6 dynamic-radius DBSCAN (9), (10) | [`crate::cluster`] |
 //! | 7 extremes of the scan lines | [`crate::blade::contour`] |
 //! | 8 spatial line clustering (11)-(13) | [`crate::cluster::line`] |
@@ -12,12 +12,14 @@
 //! | 10 tip | [`tip`] |
 //! | 11 sections by arc length (15) | [`sections`] |
 //! | 6-10 of one frame, put together | [`frame`] |
-//! | all frames of a test | [`series`] |
+//! | all frames of a test | [`series`], kept between the passes [`kept`] |
 
 pub mod curves;
 pub mod frame;
 pub mod frames;
+pub mod kept;
 pub mod passthrough;
+pub mod reader;
 pub mod sections;
 pub mod series;
 pub mod tip;

@@ -3,6 +3,7 @@
 use super::report::Pause;
 use crate::angle::{Arc, wrap_half_turn};
 use crate::clock::Unroller;
+use crate::loss::cycle::{Cycle, Restarts};
 use crate::loss::order::{Order, Passed, Stamp, Strays, Verdict};
 use crate::loss::view::FieldOfView;
 use crate::packet::{Head, ModelRef};
@@ -82,6 +83,9 @@ pub struct Arrivals<T> {
     model: ModelRef,
     clock: Unroller,
     sequence: Option<Unroller>,
+    cycle: Option<Cycle>,
+    /// Device and host time of the last packet whose number was told.
+    numbered: Option<(Timestamp, Timestamp)>,
     order: Option<Order<(Ticket, T)>>,
     period_ns: i64,
     packets: u32,
@@ -112,6 +116,8 @@ impl<T> Arrivals<T> {
             model,
             clock: Unroller::new(counting.clock_wrap_ns),
             sequence: model.sequence_wrap().map(|wrap| Unroller::new(Some(wrap))),
+            cycle: None,
+            numbered: None,
             order: None,
             period_ns: 1,
             packets: 0,
@@ -139,8 +145,10 @@ impl<T> Arrivals<T> {
         let ticket = self.complete(ticket);
         self.packets = self.packets.wrapping_add(1);
         let stamp = self.stamp(&ticket, mark);
+        let ticket = self.framed(ticket);
         let period_ns = self.model.period_ns(head.return_mode).max(1);
-        let step = if self.sequence.is_some() && head.sequence.is_some() {
+        let is_numbered = self.sequence.is_some() || self.model.restarts().is_some();
+        let step = if is_numbered && head.sequence.is_some() {
             1
         } else {
             period_ns
@@ -231,7 +239,39 @@ impl<T> Arrivals<T> {
         self.mean_rate_rad_per_ns
     }
 
+    /// Tells the place of a packet in its frame, where frames have another length than the maker states.
+    fn framed(&self, mut ticket: Ticket) -> Ticket {
+        let number = ticket.head.sequence;
+        let place = self.cycle.as_ref().zip(number);
+        if let Some((place, len)) = place.and_then(|(cycle, number)| cycle.place(number)) {
+            ticket.head = ticket.head.in_frame(place, len);
+        }
+        ticket
+    }
+
+    /// Number of a packet whose numbers start again with every frame.
+    fn cycle_key(&mut self, ticket: &Ticket, restarts: Restarts, number: u32) -> i64 {
+        let (head, now) = (&ticket.head, (ticket.device, ticket.arrival));
+        let (device, arrival) = self.numbered.replace(now).unwrap_or(now);
+        let (device_ns, host_ns) = (now.0 - device, now.1 - arrival);
+        // The device clock is the better one unless it was set.
+        let is_set = device_ns.saturating_sub(host_ns).saturating_abs() > CLOCK_SET_NS;
+        let elapsed_ns = if is_set { host_ns } else { device_ns };
+        let period_ns = head.duration_ns.max(1);
+        let cycle = self.cycle.get_or_insert_with(|| match restarts {
+            Restarts::EveryFrame => {
+                Cycle::new(restarts, head.first_number(number), head.frame_len())
+            }
+            Restarts::Perhaps => Cycle::new(restarts, 0, 1 << 16),
+        });
+        cycle.key(number, elapsed_ns as f64 / period_ns as f64)
+    }
+
     fn stamp(&mut self, ticket: &Ticket, mark: u64) -> Stamp {
+        if let (Some(restarts), Some(number)) = (self.model.restarts(), ticket.head.sequence) {
+            let key = self.cycle_key(ticket, restarts, number);
+            return Stamp { key, span: 1, mark };
+        }
         let sequence = self.sequence.as_mut().zip(ticket.head.sequence);
         match sequence {
             Some((unroller, number)) => {

@@ -1,9 +1,12 @@
 //! What a scan sums up of one lidar: counts, seconds, clock and field of view.
 
+use std::f64::consts::PI;
+
 use super::StreamKey;
 use super::arrivals::{Arrival, Arrivals, Gap, Ordered, Ticket, mark};
 use super::probe::Choice;
 use super::report::{Pause, PositionFacts, Second, StreamInfo};
+use crate::angle::wrap_turn;
 use crate::clock::ClockEstimator;
 use crate::drops::Drops;
 use crate::loss::Counts;
@@ -16,6 +19,8 @@ use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 const MAX_PENDING: usize = 4096;
 /// Turns after which the field of view is known.
 const VIEW_TURNS: u32 = 5;
+/// Packets within so many durations of each other tell the speed of the rotor.
+const NEIGHBOUR: i64 = 4;
 /// More packets than one sensor can send by this factor come from two.
 const CROWDED: f64 = 1.3;
 
@@ -34,6 +39,9 @@ pub struct Lidar {
     is_named: bool,
     candidates: Vec<&'static str>,
     left_out: Vec<&'static str>,
+    doubt: Option<String>,
+    is_early: bool,
+    remarks: Vec<String>,
     gather: Option<Box<dyn Gather>>,
     arrivals: Arrivals<Tally>,
     clock: ClockEstimator,
@@ -60,6 +68,9 @@ impl Lidar {
             is_named,
             candidates: choice.candidates,
             left_out: choice.left_out,
+            doubt: choice.doubt,
+            is_early: choice.is_early,
+            remarks: Vec::new(),
             gather: model.gather(),
             arrivals: Arrivals::new(model),
             clock: ClockEstimator::default(),
@@ -109,6 +120,9 @@ impl Lidar {
         };
         if let Some(gather) = &mut self.gather {
             gather.take(payload);
+        }
+        if self.first.is_none() {
+            self.remarks = self.model.remarks(payload);
         }
         let tally = self.model.tally(payload);
         let (ticket, what) = self.arrivals.offer(arrival, &head, mark(payload), || tally);
@@ -172,10 +186,11 @@ impl Lidar {
     fn count(&mut self, ordered: &Ordered, tally: Tally, time: Timestamp, shared: &Shared) {
         let head = ordered.ticket.head;
         let offset_ns = (ordered.ticket.arrival - ordered.ticket.device) - head.duration_ns;
+        let (turned_rad, turned_ns) = self.turned(ordered);
         let second = self.second(time, shared);
         second.points += u64::from(tally.points);
-        second.turned_rad += head.turned_rad;
-        second.turned_ns += head.duration_ns;
+        second.turned_rad += turned_rad;
+        second.turned_ns += turned_ns;
         second.offset_ns = Some(second.offset_ns.map_or(offset_ns, |o| o.min(offset_ns)));
         second.counts.packets += 1;
         second.counts.late += u64::from(ordered.is_late);
@@ -183,8 +198,31 @@ impl Lidar {
         self.counts.late += u64::from(ordered.is_late);
         self.tally.0 += u64::from(tally.points);
         self.tally.1 += u64::from(tally.merged);
-        self.turned_rad += head.turned_rad;
-        self.turned_ns += head.duration_ns;
+        self.turned_rad += turned_rad;
+        self.turned_ns += turned_ns;
+    }
+
+    /// How far the rotor turned in what time since the packet before, where that one is a neighbour: so
+    /// the speed does not hang on the model's own timing.
+    fn turned(&self, ordered: &Ordered) -> (f64, i64) {
+        let Ticket { device, head, .. } = ordered.ticket;
+        if head.rate_rad_per_ns <= 0.0 {
+            return (head.turned_rad, head.duration_ns);
+        }
+        let Some(last) = self.last.filter(|last| last.segment == ordered.segment) else {
+            return (0.0, 0);
+        };
+        let elapsed_ns = device - last.ticket.device;
+        let most_ns = NEIGHBOUR * last.ticket.head.duration_ns.max(1);
+        let turned_rad = wrap_turn(head.azimuth_rad - last.ticket.head.azimuth_rad);
+        let expected_rad = head.rate_rad_per_ns * elapsed_ns as f64;
+        let is_neighbour = ordered.gap.is_none() && (1..most_ns).contains(&elapsed_ns);
+        // Beyond half a turn nothing tells forth from back.
+        if is_neighbour && expected_rad.max(turned_rad) < PI {
+            (turned_rad, elapsed_ns)
+        } else {
+            (0.0, 0)
+        }
     }
 
     /// Counts gaps as loss, as far as they lie in the field of view.
@@ -246,7 +284,12 @@ impl Lidar {
         let is_locked = position.as_ref().is_some_and(PositionFacts::is_locked);
         let clock = self.clock.finish(is_locked);
         let end = last.ticket.device + last.ticket.head.duration_ns;
-        let minutes = self.turned_ns as f64 / 60e9;
+        let head = last.ticket.head;
+        let (turned_rad, turned_ns) = match self.turned_ns {
+            0 => (head.turned_rad, head.duration_ns),
+            turned_ns => (self.turned_rad, turned_ns),
+        };
+        let minutes = turned_ns as f64 / 60e9;
         let mut info = StreamInfo {
             key,
             model: self.model,
@@ -255,7 +298,7 @@ impl Lidar {
             unit: Vec::new(),
             calibration: Ok(Calibration::Factory),
             return_mode: last.ticket.head.return_mode.name(),
-            rpm: self.turned_rad / std::f64::consts::TAU / minutes.max(f64::MIN_POSITIVE),
+            rpm: turned_rad / std::f64::consts::TAU / minutes.max(f64::MIN_POSITIVE),
             counts: self.counts,
             points: self.tally.0,
             merged: self.tally.1,
@@ -310,13 +353,15 @@ impl Lidar {
                 "{packets} position packets to port {port}, pulse per second {pps}, {sentence}"
             ));
         }
-        if !self.left_out.is_empty() {
+        notes.extend(self.remarks.iter().cloned());
+        if !self.left_out.is_empty() && self.doubt.is_none() {
             let (model, others) = (self.model.id(), self.left_out.join(", "));
             notes.push(format!(
                 "told from {others} by the ranges, not by the header: name another model than {model} with --sensor"
             ));
         }
-        if self.candidates.len() > self.model.candidates().len() {
+        notes.extend(self.doubt.clone());
+        if self.is_early {
             let (model, others) = (self.model.id(), self.candidates.join(", "));
             notes.push(format!(
                 "too few packets to tell {model} from {others}: name the model with --sensor"

@@ -18,6 +18,10 @@ pub struct PointBlock {
     pub lidar: Vec<u16>,
     /// Turn of the lidar since its first packet.
     pub sweep: Vec<u32>,
+    /// Frame by the sensor's own count; 0 where it has none.
+    pub frame_id: Vec<u32>,
+    /// Whether there is such a count.
+    pub has_frame_id: Vec<bool>,
 }
 
 /// Tells in which turn each return was shot.
@@ -68,10 +72,13 @@ impl Sink for PointTagger {
             self.turn += 1;
             from = to;
         }
-        let rest = decoded.returns.len() - from;
+        let rest = decoded.cloud.len() - from;
         out.sweep.resize(out.sweep.len() + rest, self.turn);
-        out.lidar.resize(out.sweep.len(), self.lidar);
-        out.cloud.extend(&decoded.returns);
+        let points = out.sweep.len();
+        out.lidar.resize(points, self.lidar);
+        out.frame_id.resize(points, packet.frame_id.unwrap_or(0));
+        out.has_frame_id.resize(points, packet.frame_id.is_some());
+        out.cloud.extend(&decoded.cloud, 0..decoded.cloud.len());
     }
 
     fn finish(&mut self, _out: &mut PointBlock) {}

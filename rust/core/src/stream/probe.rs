@@ -18,6 +18,10 @@ pub struct Choice {
     pub candidates: Vec<&'static str>,
     /// Ids of models with the same header, left out for what the packets hold.
     pub left_out: Vec<&'static str>,
+    /// What the packets leave open.
+    pub doubt: Option<String>,
+    /// Whether there were too few packets to tell the candidates apart.
+    pub is_early: bool,
 }
 
 impl Choice {
@@ -27,15 +31,19 @@ impl Choice {
             model,
             candidates,
             left_out: Vec::new(),
+            doubt: None,
+            is_early: false,
         }
     }
 
     fn among(models: &[ModelRef]) -> Option<Self> {
         let (model, others) = models.split_first()?;
         let mut choice = Self::one(*model);
-        choice
-            .candidates
-            .extend(others.iter().map(|other| other.id()));
+        for other in others.iter().map(|other| other.id()) {
+            if !choice.candidates.contains(&other) {
+                choice.candidates.push(other);
+            }
+        }
         Some(choice)
     }
 }
@@ -89,6 +97,16 @@ impl Probe {
     /// A model whose bytes are not believed has to have the packet period of the data, and of several
     /// that do the nearest is taken. Where there are too few packets to tell, all are candidates.
     pub fn decide(&self) -> Option<Choice> {
+        let mut choice = self.choose()?;
+        let payloads = self.packets.iter().map(|(_, payload)| payload.as_slice());
+        let own = payloads.filter(|payload| choice.model.head(payload).is_some());
+        if let Some(model) = choice.model.as_sent(&own.collect::<Vec<_>>()) {
+            choice.model = model;
+        }
+        Some(choice)
+    }
+
+    fn choose(&self) -> Option<Choice> {
         self.packets.first()?;
         if let Some(unit) = self.unit() {
             return Some(Choice::one(unit));
@@ -98,14 +116,18 @@ impl Probe {
         }
         let claimants = self.suited();
         let is_sure = |model: &&ModelRef| self.own(**model).all(|payload| model.is_sure(payload));
-        if let Some(model) = claimants.iter().find(is_sure) {
-            let mut choice = Choice::one(*model);
+        let sure: Vec<ModelRef> = claimants.iter().filter(is_sure).copied().collect();
+        if let Some(mut choice) = Choice::among(&sure) {
             choice.left_out = self.left_out(&claimants);
+            choice.doubt = choice
+                .model
+                .doubt(&self.own(choice.model).collect::<Vec<_>>());
             return Some(choice);
         }
         let errors: Vec<Option<f64>> = claimants.iter().map(|m| self.period_error(*m)).collect();
         if errors.iter().all(Option::is_none) {
-            return Choice::among(&claimants);
+            let is_early = claimants.len() > 1;
+            return Choice::among(&claimants).map(|choice| Choice { is_early, ..choice });
         }
         let known = claimants
             .iter()

@@ -232,6 +232,7 @@ impl<S: Sink> Lane<S> {
         let placed = Placed {
             time,
             head: ticket.head,
+            frame_id: self.model.frame_id(payload),
             lost: gap.map_or(0, |gap| gap.lost_in(&self.view, step.pauses)),
             is_jump: ordered.is_jump,
         };

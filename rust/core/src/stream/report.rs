@@ -30,7 +30,7 @@ pub struct StreamInfo {
     pub calibration: Result<Calibration, UnitError>,
     /// Word for its return mode.
     pub return_mode: &'static str,
-    /// Turns a minute, in the mean.
+    /// Turns a minute, in the mean; frames a minute of sensors without a rotor.
     pub rpm: f64,
     /// Packets over the whole capture.
     pub counts: Counts,
@@ -85,7 +85,7 @@ pub struct Health {
     pub foreign: u64,
     /// Points.
     pub points: u64,
-    /// Turns a minute; `None` where nothing arrived.
+    /// Turns a minute; `None` where nothing arrived, and for sensors without a rotor.
     pub rpm: Option<f64>,
     /// Host minus device time; `None` where nothing arrived.
     pub clock_offset_s: Option<f64>,
@@ -206,7 +206,9 @@ impl ScanReport {
             let lidars = self.lidars.iter().enumerate();
             lidars.map(move |(place, lidar)| {
                 let second = lidar.seconds.get(number).copied().unwrap_or_default();
-                second.health(time, place)
+                let mut health = second.health(time, place);
+                health.rpm = health.rpm.filter(|_| lidar.model.has_rotor());
+                health
             })
         })
     }

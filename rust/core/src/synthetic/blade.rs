@@ -1,13 +1,12 @@
 //! The built blade: the drawing with the errors of its making, as a rod and as a skin.
 
-use std::f64::consts::{PI, TAU};
-
 use nalgebra::{Matrix3, Rotation3, Vector2, Vector3};
 
 use super::contour::{Airfoils, CONTOUR_POINTS, Contour};
 use super::interpolate::Spline;
 use super::random::{Stream, Subject};
 use super::reference::Stations;
+use super::shape::Shape;
 use super::solver::Rod;
 use crate::error::InvalidValue;
 
@@ -33,15 +32,8 @@ pub struct BuildErrors {
     pub stiffness: f64,
     /// Of the waves of the surface, metres.
     pub waves_m: f64,
-}
-
-/// A smooth wave over one side.
-#[derive(Debug, Clone, Copy)]
-struct Wave {
-    height_m: f64,
-    per_metre: f64,
-    over_chord: f64,
-    phase: [f64; 2],
+    /// Of errors of the section that keep their form along the blade, metres.
+    pub mould_m: f64,
 }
 
 /// A drawing, the way it is clamped, and what came out differently.
@@ -56,7 +48,7 @@ pub struct Blade {
     /// 1 where the suction side is on the side of the perpendicular, else -1.
     pub handedness: f64,
     airfoils: Airfoils,
-    waves: [Vec<Wave>; 2],
+    shape: Shape,
 }
 
 impl Blade {
@@ -88,14 +80,14 @@ impl Blade {
             .twist_rad
             .iter_mut()
             .for_each(|twist| *twist += setting_rad);
-        let waves = [(); 2].map(|()| waves(&mut stream, errors.waves_m));
+        let shape = Shape::new(&mut stream, errors.waves_m, errors.mould_m);
         Ok(Self {
             nominal,
             built,
             clamped,
             handedness,
             airfoils: Airfoils::default(),
-            waves,
+            shape,
         })
     }
 
@@ -181,36 +173,11 @@ impl Blade {
         std::array::from_fn(|i| {
             let [x_c, y_c] = contour[i];
             let side = usize::from(i > CONTOUR_POINTS / 2);
-            let swell = self.swell(side, s_m, x_c) / chord_m;
+            let swell = self.shape.swell(side, s_m, x_c) / chord_m;
             let outward = if side == 0 { swell } else { -swell };
             self.local(s_m, x_c, y_c + outward).xy()
         })
     }
-
-    /// Height of the waves, metres; it fades towards both edges.
-    fn swell(&self, side: usize, s_m: f64, x_c: f64) -> f64 {
-        let fade = (2.0 * (PI * x_c).sin()).min(1.0);
-        let height = |w: &Wave| {
-            w.height_m
-                * (w.per_metre * s_m + w.phase[0]).cos()
-                * (w.over_chord * x_c + w.phase[1]).cos()
-        };
-        fade * self.waves[side].iter().map(height).sum::<f64>()
-    }
-}
-
-/// Sixteen waves of 4 to 16 m along the blade and up to two over the chord.
-fn waves(stream: &mut Stream, sigma_m: f64) -> Vec<Wave> {
-    let count = 16;
-    // Each product of two cosines has a mean square of a quarter.
-    let each = sigma_m * (4.0 / f64::from(count)).sqrt();
-    let draw = |_| Wave {
-        height_m: each,
-        per_metre: TAU / stream.between(4.0, 16.0),
-        over_chord: TAU * stream.between(0.0, 2.0),
-        phase: [stream.between(0.0, TAU), stream.between(0.0, TAU)],
-    };
-    (0..count).map(draw).collect()
 }
 
 impl Orientation {
@@ -340,13 +307,11 @@ mod tests {
             prebend: 0.02,
             stiffness: 0.05,
             waves_m: 0.002,
+            mould_m: 0.0,
         };
         let blade = blade(&errors, -Vector3::x(), Vector3::y());
         let ratio = blade.built.chord_m[5] / blade.nominal.chord_m[5] - 1.0;
         assert!(ratio != 0.0 && ratio.abs() < 0.015);
-        let swells = (0..2000).map(|i| blade.swell(i % 2, 20.0 + 0.04 * i as f64, 0.5));
-        let rms = (swells.map(|w| w * w).sum::<f64>() / 2000.0).sqrt();
-        assert!((0.001..0.003).contains(&rms), "{rms}");
     }
 
     #[test]

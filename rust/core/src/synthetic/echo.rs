@@ -6,8 +6,9 @@ use nalgebra::Vector3;
 
 use super::body::{Body, Pose};
 use super::random::Stream;
+use super::target::RETROREFLECTIVITY;
 use super::terrain::{Hit, Ray, Terrain};
-use crate::packet::velodyne::{RawReturn, puck};
+use crate::packet::writer::Echo;
 
 /// The optics and electronics of a sensor.
 #[derive(Debug, Clone, Copy)]
@@ -28,6 +29,12 @@ pub struct Optics {
     pub grazing_rad: f64,
     /// Error of range that grows with 1 / cos(incidence) - 1, metres.
     pub incidence_bias_m: f64,
+    /// Error of range per halving of the light that comes back, against a bright wall, metres.
+    pub faint_bias_m: f64,
+    /// Error of range to retroreflectors, metres.
+    pub retro_bias_m: f64,
+    /// Degrees of freedom of the noise: few for heavy tails; 0 = normal.
+    pub noise_freedom: u32,
 }
 
 /// Echoes nearer than this are not sent.
@@ -124,6 +131,23 @@ impl Glow {
         }
     }
 
+    /// Whether most of the light comes from a retroreflector.
+    fn is_retro(&self) -> bool {
+        self.brightness > 1.0
+    }
+
+    /// 1 to 100 for matt surfaces, above for retroreflectors.
+    fn intensity(&self, stream: &mut Stream) -> u8 {
+        let scatter = 1.5 * stream.normal();
+        if self.is_retro() {
+            let above = 130.0 + 120.0 * self.brightness / RETROREFLECTIVITY + 4.0 * scatter;
+            return above.round().clamp(101.0, 255.0) as u8;
+        }
+        (100.0 * self.brightness + scatter)
+            .round()
+            .clamp(1.0, 100.0) as u8
+    }
+
     fn join(&self, other: &Glow) -> Self {
         let energy = self.energy + other.energy;
         let mean = |a: f64, b: f64| (a * self.energy + b * other.energy) / energy.max(1e-300);
@@ -138,30 +162,44 @@ impl Glow {
 
 impl Optics {
     /// The strongest echo of a shot as the sensor sends it, or none.
-    pub fn shoot(
-        &self,
-        view: &View<'_>,
-        ray: &Ray,
-        offset_m: f64,
-        stream: &mut Stream,
-    ) -> RawReturn {
+    pub fn shoot(&self, view: &View<'_>, ray: &Ray, offset_m: f64, stream: &mut Stream) -> Echo {
         let glows = view.glows(ray, self);
         let Some(echo) = self.strongest(&glows) else {
-            return RawReturn::default();
+            return Echo::default();
         };
         if !stream.happens(self.detection(&echo)) {
-            return RawReturn::default();
+            return Echo::default();
         }
-        let slant = (1.0 / echo.cosine.max(0.05) - 1.0) * self.incidence_bias_m;
-        let range_m = echo.range_m + offset_m + slant + self.noise_m * stream.normal();
+        let range_m = echo.range_m + offset_m + self.bias_m(&echo) + self.noise(stream);
         if range_m < MIN_RANGE_M || range_m > self.max_range_m {
-            return RawReturn::default();
+            return Echo::default();
         }
-        let brightness = 100.0 * echo.brightness + 1.5 * stream.normal();
-        RawReturn {
-            range: (range_m / puck::RANGE_UNIT_M).round() as u16,
-            intensity: brightness.round().clamp(1.0, 100.0) as u8,
+        Echo {
+            range_m,
+            intensity: echo.intensity(stream),
         }
+    }
+
+    fn bias_m(&self, echo: &Glow) -> f64 {
+        if echo.is_retro() {
+            return self.retro_bias_m;
+        }
+        let slant = 1.0 / echo.cosine.max(0.05) - 1.0;
+        let faint = (0.5 / echo.brightness.max(1e-3)).log2().clamp(-1.0, 5.0);
+        slant * self.incidence_bias_m + faint * self.faint_bias_m
+    }
+
+    /// Student's distribution with the deviation of the noise.
+    fn noise(&self, stream: &mut Stream) -> f64 {
+        let normal = stream.normal();
+        if self.noise_freedom < 3 {
+            return self.noise_m * normal;
+        }
+        let squares: f64 = (0..self.noise_freedom)
+            .map(|_| stream.normal().powi(2))
+            .sum();
+        let freedom = f64::from(self.noise_freedom);
+        self.noise_m * normal * ((freedom - 2.0) / squares.max(1e-12)).sqrt()
     }
 
     /// Neighbours in range melt together; the brightest of what remains is sent.
@@ -198,6 +236,9 @@ mod tests {
             max_range_m: 100.0,
             grazing_rad: 82f64.to_radians(),
             incidence_bias_m: 0.0,
+            faint_bias_m: 0.0,
+            retro_bias_m: 0.0,
+            noise_freedom: 0,
         }
     }
 
@@ -231,6 +272,45 @@ mod tests {
     }
 
     #[test]
+    fn heavy_tails_keep_the_deviation() {
+        let heavy = Optics {
+            noise_freedom: 4,
+            ..optics()
+        };
+        let mut stream = Stream::new(5, Subject::Packet, [0, 0]);
+        let draws: Vec<f64> = (0..40_000).map(|_| heavy.noise(&mut stream)).collect();
+        let sigma = (draws.iter().map(|d| d * d).sum::<f64>() / 4e4).sqrt();
+        // The square of Student's t with 4 degrees has no variance: the deviation settles slowly.
+        assert!((sigma - 0.01).abs() < 1.5e-3, "{sigma}");
+        let far = draws.iter().filter(|d| d.abs() > 0.04).count();
+        // Beyond four deviations: 0.5 % of them, of normal noise 0.006 %.
+        assert!(far > 80, "{far}");
+    }
+
+    #[test]
+    fn retroreflectors_are_told_by_their_brightness() {
+        let mut stream = Stream::new(6, Subject::Packet, [0, 0]);
+        let retro = |share| {
+            Glow::new(
+                &Hit {
+                    range_m: 20.0,
+                    cos_incidence: 0.9,
+                    reflectivity: RETROREFLECTIVITY,
+                },
+                share,
+            )
+        };
+        assert!(retro(1.0).intensity(&mut stream) > 200 && retro(0.2).intensity(&mut stream) > 100);
+        assert!(glow(20.0, 1.0, 1.0).intensity(&mut stream) <= 100);
+        let biased = Optics {
+            faint_bias_m: 0.001,
+            ..optics()
+        };
+        // A quarter of the light of a bright wall: two halvings.
+        assert!((biased.bias_m(&glow(20.0, 0.25, 1.0)) - 0.002).abs() < 1e-12);
+    }
+
+    #[test]
     fn a_footprint_is_round_and_even() {
         let places: Vec<_> = (0..FOOTPRINT_RAYS).map(footprint).collect();
         let mean = places
@@ -250,11 +330,13 @@ mod tests {
             slope: [0.0; 2],
             roughness_m: 0.0,
             correlation_m: 1.0,
+            swell_m: 0.0,
         };
         let terrain = Terrain {
             ground: Ground::new(plan, 1),
             wall: None,
             boxes: Vec::new(),
+            targets: Vec::new(),
         };
         let body = Body::empty();
         let view = View {
@@ -273,8 +355,7 @@ mod tests {
         };
         let mut stream = Stream::new(2, Subject::Packet, [0, 0]);
         let ranges: Vec<f64> = (0..4000)
-            .map(|_| optics().shoot(&view, &ray, 0.02, &mut stream).range)
-            .map(|range| f64::from(range) * 0.002)
+            .map(|_| optics().shoot(&view, &ray, 0.02, &mut stream).range_m)
             .collect();
         let mean = ranges.iter().sum::<f64>() / 4000.0;
         let sigma = (ranges.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 4000.0).sqrt();

@@ -36,9 +36,13 @@ impl Schedule {
             self.levels[(step as usize + 1).min(last)],
         );
         let way = ((time_s - step * period - self.hold_s) / self.ramp_s).clamp(0.0, 1.0);
-        // Speed and acceleration vanish at both ends.
-        from + (to - from) * way.powi(3) * (10.0 + way * (6.0 * way - 15.0))
+        from + (to - from) * smooth(way)
     }
+}
+
+/// From 0 to 1; speed and acceleration vanish at both ends.
+fn smooth(way: f64) -> f64 {
+    way.powi(3) * (10.0 + way * (6.0 * way - 15.0))
 }
 
 /// Swaying in one mode.
@@ -54,10 +58,18 @@ pub struct Sway {
     pub amplitude_m: f64,
     /// Phase at the start, rad.
     pub phase_rad: f64,
+    /// Driven from an instant on, seconds, and grown to its amplitude so many seconds later; `None`:
+    /// it sways all the time and beats.
+    pub driven: Option<(f64, f64)>,
 }
 
 impl Sway {
     fn at(&self, time_s: f64) -> f64 {
+        if let Some((start_s, grown_s)) = self.driven {
+            let way = ((time_s - start_s) / grown_s).clamp(0.0, 1.0);
+            let angle = TAU * self.frequency_hz * (time_s - start_s) + self.phase_rad;
+            return self.amplitude_m * smooth(way) * angle.sin();
+        }
         // Beats slowly, as wind and winches excite it.
         let beat = 1.0 + 0.25 * (TAU * 0.11 * time_s + 2.0 * self.phase_rad).sin();
         self.amplitude_m * beat * (TAU * self.frequency_hz * time_s + self.phase_rad).sin()
@@ -130,6 +142,11 @@ impl Motion {
             levels,
             responses,
         })
+    }
+
+    /// Whether a mode is driven, so that the blade moves fast.
+    pub fn is_driven(&self) -> bool {
+        self.sways.iter().any(|sway| sway.driven.is_some())
     }
 
     /// Share of full load at a time.
@@ -264,6 +281,23 @@ mod tests {
     }
 
     #[test]
+    fn a_driven_mode_keeps_its_frequency_and_amplitude() {
+        let swing = Sway {
+            direction: Vector3::y(),
+            order: 1,
+            frequency_hz: 0.8,
+            amplitude_m: 2.0,
+            phase_rad: 0.0,
+            driven: Some((3.0, 5.0)),
+        };
+        assert_eq!(swing.at(2.9), 0.0);
+        for cycle in 0..50 {
+            let crest_s = 3.0 + (8.0 + f64::from(cycle) + 0.25) / 0.8;
+            assert!((swing.at(crest_s) - 2.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
     fn the_tip_sways_by_its_amplitude() {
         let sway = Sway {
             direction: Vector3::y(),
@@ -271,6 +305,7 @@ mod tests {
             frequency_hz: 0.5,
             amplitude_m: 0.01,
             phase_rad: 0.0,
+            driven: None,
         };
         let (still, moving) = (motion(vec![]), motion(vec![sway]));
         let away = |time: f64| {

@@ -121,7 +121,8 @@ impl NetworkPlan {
                 arrivals.push(arrival(time + 7_000, 1, source, host, payload));
             }
         }
-        for (index, lidar) in lidars.iter().enumerate() {
+        let told = lidars.iter().enumerate();
+        for (index, lidar) in told.filter(|(_, lidar)| lidar.plan.sensor.writer.has_position()) {
             for number in ticks(self.position_hz, from_ns, to_ns) {
                 let scene_ns = tick_ns(self.position_hz, number) + 41_000 * (index as i64 + 1);
                 let order = 2 + index as u64;

@@ -10,6 +10,7 @@ use super::motion::{Schedule, Sway};
 use super::network::NetworkPlan;
 use super::reference::Stations;
 use super::solver::Pull;
+use super::target::Target;
 use super::terrain::{Crate, GroundPlan, Wall};
 use crate::error::InvalidValue;
 use crate::time::Timestamp;
@@ -62,6 +63,8 @@ pub struct ScenePlan {
     pub wall: Option<Wall>,
     /// Boxes.
     pub boxes: Vec<Crate>,
+    /// Targets.
+    pub targets: Vec<Target>,
     /// Sensors.
     pub lidars: Vec<LidarPlan>,
     /// Optics of all sensors.

@@ -21,6 +21,8 @@ pub enum Subject {
     Network = 5,
     /// Survey and channels.
     Survey = 6,
+    /// A drawing that nobody published.
+    Drawing = 7,
 }
 
 /// Random numbers of one subject and its part (such as lidar and packet).

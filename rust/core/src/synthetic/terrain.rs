@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::random::{Stream, Subject};
+use super::target::Target;
 
 /// A ray in the world frame; the direction has length one.
 #[derive(Debug, Clone, Copy)]
@@ -52,11 +53,15 @@ pub struct GroundPlan {
     pub roughness_m: f64,
     /// Distance over which heights are alike, metres.
     pub correlation_m: f64,
+    /// Standard deviation of wider swells, eight times as long, metres.
+    pub swell_m: f64,
 }
 
 const REFLECTIVITY_GROUND: f64 = 0.2;
 const REFLECTIVITY_WALL: f64 = 0.45;
 const REFLECTIVITY_BOX: f64 = 0.35;
+/// Swells are so many times as long as the roughness.
+const SWELL: f64 = 8.0;
 /// Cells of the height field before it repeats.
 const CELLS: usize = 256;
 
@@ -64,6 +69,13 @@ const CELLS: usize = 256;
 #[derive(Debug, Clone)]
 pub struct Ground {
     plan: GroundPlan,
+    fields: Vec<Field>,
+}
+
+/// Smooth heights over a grid.
+#[derive(Debug, Clone)]
+struct Field {
+    cell_m: f64,
     heights_m: Vec<f32>,
 }
 
@@ -71,12 +83,17 @@ impl Ground {
     /// Draws the heights from `seed`.
     pub fn new(plan: GroundPlan, seed: u64) -> Self {
         let mut stream = Stream::new(seed, Subject::Ground, [0, 0]);
-        // Bilinear blending averages; the factor gives the deviation back in the mean over a cell.
-        let scale = plan.roughness_m * 1.5;
-        let heights_m = (0..CELLS * CELLS)
-            .map(|_| (scale * stream.normal()) as f32)
-            .collect();
-        Self { plan, heights_m }
+        let scales = [
+            (plan.roughness_m, plan.correlation_m),
+            (plan.swell_m, SWELL * plan.correlation_m),
+        ];
+        let scales = scales.into_iter().filter(|(sigma_m, _)| *sigma_m > 0.0);
+        Self {
+            plan,
+            fields: scales
+                .map(|(sigma_m, cell_m)| Field::new(&mut stream, sigma_m, cell_m))
+                .collect(),
+        }
     }
 
     fn plane_m(&self, x: f64, z: f64) -> f64 {
@@ -84,17 +101,7 @@ impl Ground {
     }
 
     fn rough_m(&self, x: f64, z: f64) -> f64 {
-        let (u, v) = (x / self.plan.correlation_m, z / self.plan.correlation_m);
-        let (i, j) = (u.floor(), v.floor());
-        // Smooth weights, so that no crease follows the grid.
-        let ease = |t: f64| t * t * (3.0 - 2.0 * t);
-        let (a, b) = (ease(u - i), ease(v - j));
-        let row = |i: f64| (i.rem_euclid(CELLS as f64) as usize % CELLS) * CELLS;
-        let column = |j: f64| j.rem_euclid(CELLS as f64) as usize % CELLS;
-        let height = |row: usize, column: usize| f64::from(self.heights_m[row + column]);
-        let (r0, r1, c0, c1) = (row(i), row(i + 1.0), column(j), column(j + 1.0));
-        (1.0 - a) * ((1.0 - b) * height(r0, c0) + b * height(r0, c1))
-            + a * ((1.0 - b) * height(r1, c0) + b * height(r1, c1))
+        self.fields.iter().map(|field| field.height_m(x, z)).sum()
     }
 
     /// Height at a place, metres.
@@ -111,7 +118,7 @@ impl Ground {
             return None;
         }
         let mut range_m = above / sink;
-        for _ in 0..3 {
+        for _ in 0..if self.fields.is_empty() { 0 } else { 3 } {
             let at = ray.at(range_m);
             range_m = (above - self.rough_m(at.x, at.z)) / sink;
         }
@@ -121,6 +128,31 @@ impl Ground {
             cos_incidence: -normal.dot(d),
             reflectivity: REFLECTIVITY_GROUND,
         })
+    }
+}
+
+impl Field {
+    fn new(stream: &mut Stream, sigma_m: f64, cell_m: f64) -> Self {
+        // Bilinear blending averages; the factor gives the deviation back in the mean over a cell.
+        let scale = sigma_m * 1.5;
+        let heights_m = (0..CELLS * CELLS)
+            .map(|_| (scale * stream.normal()) as f32)
+            .collect();
+        Self { cell_m, heights_m }
+    }
+
+    fn height_m(&self, x: f64, z: f64) -> f64 {
+        let (u, v) = (x / self.cell_m, z / self.cell_m);
+        let (i, j) = (u.floor(), v.floor());
+        // Smooth weights, so that no crease follows the grid.
+        let ease = |t: f64| t * t * (3.0 - 2.0 * t);
+        let (a, b) = (ease(u - i), ease(v - j));
+        let row = |i: f64| (i.rem_euclid(CELLS as f64) as usize % CELLS) * CELLS;
+        let column = |j: f64| j.rem_euclid(CELLS as f64) as usize % CELLS;
+        let height = |row: usize, column: usize| f64::from(self.heights_m[row + column]);
+        let (r0, r1, c0, c1) = (row(i), row(i + 1.0), column(j), column(j + 1.0));
+        (1.0 - a) * ((1.0 - b) * height(r0, c0) + b * height(r0, c1))
+            + a * ((1.0 - b) * height(r1, c0) + b * height(r1, c1))
     }
 }
 
@@ -135,23 +167,38 @@ pub struct Wall {
     pub z_m: [f64; 2],
     /// Height of its top, metres.
     pub top_m: f64,
+    /// By how much its middle stands out against its ends, metres.
+    pub bow_m: f64,
+    /// By how much it leans at its top, metres per metre of height over y = 0.
+    pub lean: f64,
 }
 
 impl Wall {
-    /// x of the wall at z, metres.
-    pub fn at(&self, z: f64) -> f64 {
-        self.x_m + self.slope * z
+    /// x of the wall at a height and a place along the blade, metres.
+    pub fn at(&self, y: f64, z: f64) -> f64 {
+        let [from, to] = self.z_m;
+        let place = 2.0 * (z - from) / (to - from) - 1.0;
+        self.plane(y, z) + self.bow_m * (1.0 - place * place)
+    }
+
+    fn plane(&self, y: f64, z: f64) -> f64 {
+        self.x_m + self.slope * z + self.lean * y
     }
 
     /// Where a ray meets the wall, whatever lies below.
     pub fn hit(&self, ray: &Ray) -> Option<Hit> {
         let (o, d) = (&ray.origin_m, &ray.direction);
-        let range_m = (self.at(o.z) - o.x) / (d.x - self.slope * d.z);
+        let closing = d.x - self.slope * d.z - self.lean * d.y;
+        let mut range_m = (self.plane(o.y, o.z) - o.x) / closing;
+        for _ in 0..if self.bow_m == 0.0 { 0 } else { 4 } {
+            let at = ray.at(range_m);
+            range_m += (self.at(at.y, at.z) - at.x) / closing;
+        }
         let at = ray.at(range_m);
         let seen = range_m > 0.0 && at.y < self.top_m && (self.z_m[0]..self.z_m[1]).contains(&at.z);
         seen.then(|| Hit {
             range_m,
-            cos_incidence: ((d.x - self.slope * d.z) / self.slope.hypot(1.0)).abs(),
+            cos_incidence: (closing / (1.0 + self.slope.powi(2) + self.lean.powi(2)).sqrt()).abs(),
             reflectivity: REFLECTIVITY_WALL,
         })
     }
@@ -193,6 +240,8 @@ pub struct Terrain {
     pub wall: Option<Wall>,
     /// Boxes.
     pub boxes: Vec<Crate>,
+    /// Targets.
+    pub targets: Vec<Target>,
 }
 
 impl Terrain {
@@ -215,6 +264,10 @@ impl Terrain {
             });
             nearest = Hit::nearer(nearest, hit.filter(|hit| hit.range_m < limit_m));
         }
+        for target in &self.targets {
+            let hit = target.hit(ray).filter(|hit| hit.range_m < limit_m);
+            nearest = Hit::nearer(nearest, hit);
+        }
         nearest
     }
 }
@@ -236,6 +289,7 @@ mod tests {
             slope: [0.1, 0.0],
             roughness_m,
             correlation_m: 0.7,
+            swell_m: 0.0,
         };
         Ground::new(plan, 5)
     }
@@ -272,6 +326,8 @@ mod tests {
             slope: 0.0,
             z_m: [-5.0, 5.0],
             top_m: 4.0,
+            bow_m: 0.0,
+            lean: 0.0,
         };
         assert_eq!(wall.hit(&ray([-1.0, 0.0, 0.0])).unwrap().range_m, 10.0);
         assert!(wall.hit(&ray([-1.0, 0.5, 0.0])).is_none());
@@ -279,5 +335,24 @@ mod tests {
         let hit = box_hit(&Vector3::new(-3.0, 0.2, 0.0), &Vector3::x(), &half);
         assert_eq!(hit, Some((2.5, 1.0)));
         assert!(box_hit(&Vector3::new(-3.0, 0.6, 0.0), &Vector3::x(), &half).is_none());
+    }
+
+    #[test]
+    fn a_bent_wall_is_met_on_its_surface() {
+        let wall = Wall {
+            x_m: -20.0,
+            slope: 0.02,
+            z_m: [60.0, 140.0],
+            top_m: 5.0,
+            bow_m: 0.3,
+            lean: 0.01,
+        };
+        let ray = Ray {
+            origin_m: Vector3::new(0.0, -5.0, 90.0),
+            direction: Vector3::new(-0.9, 0.2, 0.3).normalize(),
+        };
+        let at = ray.at(wall.hit(&ray).unwrap().range_m);
+        assert!((at.x - wall.at(at.y, at.z)).abs() < 1e-6);
+        assert!((wall.at(0.0, 100.0) - wall.at(0.0, 60.0) - 0.3 - 0.8).abs() < 1e-12);
     }
 }

@@ -89,7 +89,7 @@ pub fn writers() -> Vec<Writer> {
         velodyne("vlp32a", 0x23, &[0], VELODYNE),
         velodyne("vls128", 0xA1, &[0, 1, 2, 3], VELODYNE),
         velodyne("hdl64e-s2", b'x', &[0, 1], SINGLE),
-        velodyne("hdl64e-s3", b'x', &[0, 1], SINGLE),
+        velodyne("hdl64e", b'x', &[0, 1], SINGLE),
         hesai(&pandar::PANDAR40P, (10, 40), HESAI),
         hesai(&pandar::PANDAR40AC, (10, 40), HESAI),
         hesai(&pandar::PANDAR64, (6, 64), HESAI),

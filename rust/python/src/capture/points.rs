@@ -101,6 +101,8 @@ fn columns(py: Python<'_>, block: PointBlock) -> PyResult<Bound<'_, PyDict>> {
     columns.set_item("time_ns", cloud.time_ns.into_pyarray(py))?;
     columns.set_item("lidar", block.lidar.into_pyarray(py))?;
     columns.set_item("sweep", block.sweep.into_pyarray(py))?;
+    columns.set_item("frame_id", block.frame_id.into_pyarray(py))?;
+    columns.set_item("has_frame_id", block.has_frame_id.into_pyarray(py))?;
     columns.set_item("packet", cloud.packet.into_pyarray(py))?;
     columns.set_item("block", cloud.block.into_pyarray(py))?;
     columns.set_item("ring", cloud.ring.into_pyarray(py))?;

@@ -281,7 +281,7 @@ impl Decoder for Ft120Decoder {
             let ((sin, cos), (sin_v, cos_v)) = (azimuth_rad.sin_cos(), elevation_rad.sin_cos());
             let level_m = range_m * cos_v;
             out.encoder_rad.push(wrapped(packet.azimuth_rad()));
-            out.returns.push(Return {
+            out.cloud.push(&Return {
                 xyz_m: [level_m * sin, level_m * cos, range_m * sin_v].map(|v| v as f32),
                 time: place.time,
                 range_m: range_m as f32,

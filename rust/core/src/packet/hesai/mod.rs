@@ -15,4 +15,5 @@ pub mod pandar128;
 pub mod qt128;
 pub mod rotating;
 pub mod unit;
+pub mod writer;
 pub mod xt;

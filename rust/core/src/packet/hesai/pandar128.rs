@@ -48,7 +48,7 @@ static UNIT_JT: LazyLock<Unit> =
 
 /// Pandar128E3X.
 pub static PANDAR128: Rotating<Pandar128> = Rotating(Pandar128 {
-    id: "pandar128e3x",
+    id: "pandar128",
     title: "Hesai Pandar128E3X",
     channels: 128,
     versions: (0, 127),
@@ -59,7 +59,7 @@ pub static PANDAR128: Rotating<Pandar128> = Rotating(Pandar128 {
 
 /// Pandar90E3X.
 pub static PANDAR90: Rotating<Pandar128> = Rotating(Pandar128 {
-    id: "pandar90e3x",
+    id: "pandar90",
     title: "Hesai Pandar90E3X",
     channels: 90,
     unit: &UNIT_90,

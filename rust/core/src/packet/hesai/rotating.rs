@@ -388,7 +388,7 @@ impl Firing {
                 let ((sin, cos), (sin_v, cos_v)) = (ray.azimuth, ray.elevation);
                 let level_m = range_m * cos_v;
                 out.encoder_rad.push(wrapped(self.encoder_rad));
-                out.returns.push(Return {
+                out.cloud.push(&Return {
                     xyz_m: [level_m * sin, level_m * cos, range_m * sin_v].map(|v| v as f32),
                     time: self.time + ray.delay_ns,
                     range_m: range_m as f32,

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::layout::{ENCODER_TICKS, Header, Layout, View};
+use super::profile::{PROFILES, Profile};
 use super::{OBTAIN, Span, inertial, metadata, unit};
 use crate::angle::wrap_turn;
 use crate::error::UnitError;
@@ -11,31 +12,36 @@ use crate::packet::{
     Counting, Head, Misfit, Model, ModelRef, PacketKind, ReturnMode, Tally, UnitFacts,
 };
 
-/// Any Ouster sensor.
-pub static OUSTER: Bare = Bare {
-    id: "ouster",
-    title: "Ouster OS0, OS1, OS2 or OSDome",
-};
-/// OS0, when it is named; with metadata it is found by itself.
-pub static OS0: Bare = Bare {
-    id: "os0",
-    title: "Ouster OS0",
-};
-/// OS1.
-pub static OS1: Bare = Bare {
-    id: "os1",
-    title: "Ouster OS1",
-};
-/// OS2.
-pub static OS2: Bare = Bare {
-    id: "os2",
-    title: "Ouster OS2",
-};
-/// OSDome.
-pub static OSDOME: Bare = Bare {
-    id: "osdome",
-    title: "Ouster OSDome",
-};
+const fn bare(id: &'static str, title: &'static str) -> Bare {
+    Bare { id, title }
+}
+
+/// Any Ouster sensor; with metadata it is found as the product that they name.
+pub static OUSTER: Bare = bare("ouster", "Ouster OS0, OS1, OS2 or OSDome");
+/// A product line whose number of beams is not known.
+pub static OS0: Bare = bare("os0", "Ouster OS0");
+/// As [`OS0`].
+pub static OS1: Bare = bare("os1", "Ouster OS1");
+/// As [`OS0`].
+pub static OS2: Bare = bare("os2", "Ouster OS2");
+/// As [`OS0`].
+pub static OSDOME: Bare = bare("osdome", "Ouster OSDome");
+/// Products by their number of beams.
+pub static PRODUCTS: [Bare; 13] = [
+    bare("os0-32", "Ouster OS0-32"),
+    bare("os0-64", "Ouster OS0-64"),
+    bare("os0-128", "Ouster OS0-128"),
+    bare("os1-16", "Ouster OS1-16"),
+    bare("os1-32", "Ouster OS1-32"),
+    bare("os1-64", "Ouster OS1-64"),
+    bare("os1-128", "Ouster OS1-128"),
+    bare("os2-32", "Ouster OS2-32"),
+    bare("os2-64", "Ouster OS2-64"),
+    bare("os2-128", "Ouster OS2-128"),
+    bare("osdome-32", "Ouster OSDome-32"),
+    bare("osdome-64", "Ouster OSDome-64"),
+    bare("osdome-128", "Ouster OSDome-128"),
+];
 
 /// Columns of a packet that occur; 16 unless the sensor was set otherwise.
 const COLUMNS: [usize; 4] = [16, 8, 32, 4];
@@ -54,23 +60,48 @@ pub struct Bare {
 /// A layout whose columns follow each other. Several share sizes; they put columns at the same places, so
 /// that times and numbers are right whichever it is.
 fn guess(payload: &[u8]) -> Option<View<'_>> {
-    for header in [Header::Standard, Header::Safety, Header::Legacy] {
-        for columns in COLUMNS {
-            for (pixels, pixel_len) in sizes(header) {
-                let layout = Layout {
-                    header,
-                    columns,
-                    pixels,
-                    pixel_len,
-                };
-                let view = View::new(payload, layout).filter(is_sound);
-                if view.is_some() {
-                    return view;
-                }
-            }
-        }
-    }
-    None
+    layouts(payload).next()
+}
+
+/// All layouts of the payload's size whose columns follow each other.
+fn layouts(payload: &[u8]) -> impl Iterator<Item = View<'_>> {
+    let headers = [Header::Standard, Header::Safety, Header::Legacy];
+    let sized = headers.into_iter().flat_map(|header| {
+        COLUMNS
+            .into_iter()
+            .flat_map(move |columns| sizes(header).map(move |size| (header, columns, size)))
+    });
+    let views = sized.filter_map(|(header, columns, (pixels, pixel_len))| {
+        let layout = Layout {
+            header,
+            columns,
+            pixels,
+            pixel_len,
+        };
+        View::new(payload, layout)
+    });
+    views.filter(is_sound)
+}
+
+/// What a layout is, for people.
+fn wording(view: &View<'_>) -> String {
+    let layout = view.layout();
+    let is_legacy = |profile: &Profile| profile.name == PROFILES[0].name;
+    let is_safety = |profile: &Profile| profile.name.starts_with("FUSA");
+    let fits = |profile: &&Profile| {
+        profile.pixel_len == layout.pixel_len
+            && is_legacy(profile) == (layout.header == Header::Legacy)
+            && (layout.header != Header::Safety || is_safety(profile))
+            && (layout.header == Header::Safety || !is_safety(profile))
+    };
+    let names: Vec<&str> = PROFILES.iter().filter(fits).map(|p| p.name).collect();
+    let names = if names.is_empty() {
+        "an unknown profile".into()
+    } else {
+        names.join(" or ")
+    };
+    let (columns, beams) = (layout.columns, layout.pixels);
+    format!("{columns} columns of {beams} beams with {names}")
 }
 
 /// Pixels of a column and bytes of a pixel.
@@ -102,6 +133,15 @@ impl Model for Bare {
         self.title
     }
 
+    /// The line and the number of beams are known from the metadata alone.
+    fn candidates(&self) -> &'static [&'static str] {
+        if self.id == OUSTER.id {
+            &["os0", "os1", "os2", "osdome"]
+        } else {
+            &[]
+        }
+    }
+
     /// The lines cannot be told apart, so that only the first model claims packets.
     fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
         if self.id != OUSTER.id {
@@ -109,6 +149,20 @@ impl Model for Bare {
         }
         let data = guess(payload).map(|_| PacketKind::Data);
         data.or_else(|| inertial::kind(payload))
+    }
+
+    fn remarks(&self, payload: &[u8]) -> Vec<String> {
+        let fits: Vec<String> = layouts(payload).map(|view| wording(&view)).collect();
+        let mut remarks = vec![format!(
+            "{} bytes are {}",
+            payload.len(),
+            fits.join(", or ")
+        )];
+        let serial = guess(payload).map_or(0, |view| view.serial());
+        if serial != 0 {
+            remarks.push(format!("the packets name serial number {serial}"));
+        }
+        remarks
     }
 
     fn fits(&self, payload: &[u8]) -> bool {
@@ -173,7 +227,9 @@ impl Model for Bare {
     }
 
     fn covers(&self, unit: ModelRef) -> bool {
-        unit.id() == self.id || self.id == OUSTER.id && unit.title().starts_with("Ouster")
+        let is_line = unit.id().strip_prefix(self.id);
+        is_line.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
+            || self.id == OUSTER.id && unit.title().starts_with("Ouster")
     }
 
     fn describe(&self, _files: &[UnitFile]) -> UnitFacts {
@@ -280,6 +336,15 @@ mod tests {
         assert!((head.rate_rad_per_ns * 1e9 / TAU - 10.0).abs() < 1e-3);
         assert_eq!(OS1.recognise(&packet(Header::Legacy)), None);
         assert!(OS1.fits(&packet(Header::Legacy)));
+    }
+
+    #[test]
+    fn what_it_can_be_is_said() {
+        let remarks = OUSTER.remarks(&packet(Header::Standard));
+        assert!(remarks[0].starts_with("12544 bytes are 16 columns of 64 beams with RNG19"));
+        assert!(remarks[1].ends_with("serial number 4"));
+        let safety = OUSTER.remarks(&packet(Header::Safety));
+        assert!(safety[0].contains("64 beams with FUSA_RNG15"), "{safety:?}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use super::json::Json;
 use super::layout::{Header, Layout};
 use super::profile::{PROFILES, Profile};
 use crate::error::UnitError;
+use crate::packet::Model;
 use crate::packet::ReturnMode;
 use crate::packet::unit::UnitFile;
 
@@ -282,8 +283,16 @@ fn generation_1() -> (Vec<f64>, Vec<f64>) {
 }
 
 impl Metadata {
-    /// Id of the product line: what a user may name.
-    pub fn line(&self) -> &'static str {
+    /// Id of the product: line and number of beams, or the line alone for a number that is not sold.
+    pub fn id(&self) -> &'static str {
+        let product = format!("{}-{}", self.line(), self.layout.pixels);
+        let known = super::bare::PRODUCTS.iter().map(Model::id);
+        let mut same = known.filter(|id| **id == *product);
+        same.next().unwrap_or(self.line())
+    }
+
+    /// Id of the product line.
+    fn line(&self) -> &'static str {
         let product = self.product.to_ascii_lowercase();
         match product.split('-').nth(1) {
             Some("0") => "os0",
@@ -350,7 +359,7 @@ mod tests {
             "lidar_mode": "512x20"}"#).unwrap();
         assert_eq!(nested, flat);
         assert_eq!(
-            (flat.line(), flat.packets_per_turn(), flat.rate_hz),
+            (flat.id(), flat.packets_per_turn(), flat.rate_hz),
             ("os1", 32, 20.0)
         );
         assert_eq!(flat.serial, 122_239_000_672);

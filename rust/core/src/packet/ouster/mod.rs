@@ -13,6 +13,7 @@ pub mod layout;
 pub mod metadata;
 pub mod profile;
 pub mod unit;
+pub mod writer;
 
 use layout::{Column, View};
 

@@ -112,7 +112,7 @@ impl Unit {
 
 impl Model for Unit {
     fn id(&self) -> &'static str {
-        self.metadata.line()
+        self.metadata.id()
     }
 
     fn title(&self) -> &'static str {
@@ -136,6 +136,10 @@ impl Model for Unit {
         let (found, expected) = (payload.len(), self.metadata.layout.packet_len());
         let why = format!("{found} bytes, {expected} by {}", self.file.name);
         Misfit { why, may_be: None }
+    }
+
+    fn frame_id(&self, payload: &[u8]) -> Option<u32> {
+        self.view(payload).map(|view| view.frame())
     }
 
     fn head(&self, payload: &[u8]) -> Option<Head> {
@@ -295,7 +299,7 @@ impl Decoder for UnitDecoder {
                     let Some((xyz_m, azimuth_rad)) = spot else {
                         continue;
                     };
-                    out.returns.push(Return {
+                    out.cloud.push(&Return {
                         xyz_m,
                         time: place.time + since_ns,
                         range_m: (f64::from(range_mm) * 0.001) as f32,

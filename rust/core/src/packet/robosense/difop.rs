@@ -1,7 +1,7 @@
 //! Packets that describe the unit (DIFOP): angles, return mode, serial number, state of the clock.
 
-use crate::capture::DatagramReader;
 use crate::packet::unit::UnitFile;
+pub(super) use crate::packet::unit::find;
 
 /// Byte ranges.
 mod field {
@@ -59,6 +59,15 @@ impl<'a> Difop<'a> {
     /// Whether the angles count in the other sense.
     pub fn is_reversed(&self) -> bool {
         self.0[field::REVERSED] == 1
+    }
+
+    /// Lasers of up to 32 whose elevations are programmed.
+    pub fn lasers(&self) -> usize {
+        const MOST: usize = 32;
+        let bytes = &self.0[field::ELEVATIONS..field::ELEVATIONS + 3 * MOST];
+        let is_blank = |bytes: &[u8]| bytes.iter().all(|byte| *byte == bytes[0]) && bytes[0] != 1;
+        let told = bytes.chunks_exact(3).rposition(|angle| !is_blank(angle));
+        told.map_or(0, |last| last + 1)
     }
 
     /// Serial number in hexadecimal.
@@ -135,19 +144,7 @@ impl<'a> Difop<'a> {
 
 /// The packet in a file: the packet itself, or the first one of a capture.
 pub fn packet(file: &UnitFile) -> Option<[u8; LEN]> {
-    /// A capture has one a second.
-    const MOST_DATAGRAMS: usize = 1_000_000;
-    if let Some(difop) = Difop::new(&file.content) {
-        return Some(*difop.0);
-    }
-    let mut reader = DatagramReader::new(&file.content[..]).ok()?;
-    for _ in 0..MOST_DATAGRAMS {
-        let datagram = reader.next().ok()??;
-        if let Some(difop) = Difop::new(datagram.payload) {
-            return Some(*difop.0);
-        }
-    }
-    None
+    find(file, |payload| Difop::new(payload).map(|difop| *difop.0))
 }
 
 /// Writes a packet.

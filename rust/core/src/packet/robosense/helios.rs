@@ -1,7 +1,10 @@
 //! RoboSense Helios: 32 lasers in three fields of view, and the Helios 16P with 16 of them.
 //!
 //! Firmware of 2021 does not write which of them it is. A Helios 16P fires its 16 lasers twice in a block,
-//! so that its channels 0 to 15 and 16 to 31 see nearly the same; a Helios 32 has other lasers there.
+//! so that its channels 0 to 15 and 16 to 31 see nearly the same; a Helios 32 has other lasers there. Where
+//! no model is written and the halves see different things the packets are taken for those of a Helios 16P,
+//! as which the one public recording of that firmware is labelled by its owner and was decoded with the
+//! maker's driver, although they speak for a Helios 32: that one is a candidate, and a note says so.
 //!
 //! Source: manual of the RS-Helios; firing times as in the maker's driver. For the Helios 16P the manual
 //! has the second sequence at 55.56 us, the driver at 27.68 us; the driver's is taken.
@@ -9,7 +12,7 @@
 use std::sync::LazyLock;
 
 use super::difop::{Angles, Difop};
-use super::layout::{ID, Layout, Stamp, View, kind, type_of};
+use super::layout::{ID, Layout, Stamp, View, field, kind, type_of};
 use super::rotating::{Family, Lens, Rotating, Slot};
 use super::table::Table;
 use crate::packet::ReturnMode;
@@ -63,10 +66,10 @@ impl Helios {
 impl Family for Helios {
     fn id(&self) -> &'static str {
         match self {
-            Self::Wide => "helios-32",
-            Self::Middle => "helios-32-31deg",
-            Self::Narrow => "helios-32-26deg",
-            Self::Half => "helios-16p",
+            Self::Wide => "helios32",
+            Self::Middle => "helios32-31deg",
+            Self::Narrow => "helios32-26deg",
+            Self::Half => "helios16p",
         }
     }
 
@@ -97,8 +100,33 @@ impl Family for Helios {
             _ if is_told => true,
             Self::Middle | Self::Narrow => false,
             Self::Wide => halves_agree(self.layout(), packets) != Some(true),
-            Self::Half => halves_agree(self.layout(), packets) != Some(false),
+            Self::Half => true,
         }
+    }
+
+    fn doubt(&self, packets: &[&[u8]]) -> Option<String> {
+        let is_told = packets.iter().any(|payload| kind(payload)[2] != 0);
+        if *self != Self::Half || is_told {
+            return None;
+        }
+        let seen = match halves_agree(self.layout(), packets) {
+            Some(true) => return None,
+            None => "too little is seen to tell",
+            Some(false) => {
+                "the two halves of its blocks see different things, which speaks for helios32"
+            }
+        };
+        Some(format!(
+            "the header names no model (firmware of 2021): decoded as helios16p; {seen}; \
+             if it has 32 lasers, name it: --sensor SOURCE=helios32"
+        ))
+    }
+
+    fn header(&self) -> Vec<(usize, u8)> {
+        vec![
+            (field::TYPE.start + 1, TYPE),
+            (field::TYPE.start + 2, self.model_byte()),
+        ]
     }
 
     fn lasers(&self) -> usize {

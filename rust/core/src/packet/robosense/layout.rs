@@ -7,7 +7,7 @@ use crate::packet::hesai::date;
 use crate::time::NANOS_PER_SECOND;
 
 /// Byte ranges of the header.
-mod field {
+pub(super) mod field {
     use std::ops::Range;
 
     pub const COUNTER: Range<usize> = 12..16; // u32
@@ -95,11 +95,21 @@ pub struct View<'a> {
     blocks: usize,
 }
 
-fn big(bytes: &[u8], range: Range<usize>) -> u64 {
+/// A number of several bytes; 0 beyond the end.
+pub(super) fn big(bytes: &[u8], range: Range<usize>) -> u64 {
     let known = bytes.get(range).unwrap_or(&[]);
     known
         .iter()
         .fold(0, |value, byte| value << 8 | u64::from(*byte))
+}
+
+/// Nanoseconds since 1970 of a time that is told in seconds and microseconds.
+pub(super) fn seconds_ns(bytes: &[u8], at: usize) -> i64 {
+    let seconds = i64::try_from(big(bytes, at..at + 6)).unwrap_or(i64::MAX);
+    let nanos = i64::try_from(big(bytes, at + 6..at + 10) * 1000).unwrap_or(0);
+    seconds
+        .saturating_mul(NANOS_PER_SECOND)
+        .saturating_add(nanos)
 }
 
 impl<'a> View<'a> {
@@ -161,13 +171,7 @@ impl<'a> View<'a> {
         let at = self.layout.time;
         let field = |from: usize, to: usize| big(self.bytes, at + from..at + to);
         match self.layout.stamp {
-            Stamp::Seconds => {
-                let seconds = i64::try_from(field(0, 6)).unwrap_or(i64::MAX);
-                let nanos = i64::try_from(field(6, 10) * 1000).unwrap_or(0);
-                seconds
-                    .saturating_mul(NANOS_PER_SECOND)
-                    .saturating_add(nanos)
-            }
+            Stamp::Seconds => seconds_ns(self.bytes, at),
             Stamp::Calendar => {
                 let mut day = [0_u8; 6];
                 for (place, byte) in day.iter_mut().enumerate() {
@@ -258,7 +262,8 @@ pub fn encode(layout: &Layout, packet: &RawPacket) -> Vec<u8> {
     bytes
 }
 
-fn stamp_bytes(stamp: Stamp, time_ns: i64) -> [u8; 10] {
+/// Bytes of a time, to the microsecond.
+pub(super) fn stamp_bytes(stamp: Stamp, time_ns: i64) -> [u8; 10] {
     let micros = time_ns.div_euclid(1000);
     let (seconds, micros) = (micros.div_euclid(1_000_000), micros.rem_euclid(1_000_000));
     let mut bytes = [0; 10];

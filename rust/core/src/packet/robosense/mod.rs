@@ -11,4 +11,6 @@ pub mod layout;
 pub mod rotating;
 pub mod rs;
 pub mod ruby;
+pub mod solid;
 pub mod table;
+pub mod writer;

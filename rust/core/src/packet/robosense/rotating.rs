@@ -77,6 +77,16 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
         true
     }
 
+    /// What the packets of a stream leave open although this model is taken.
+    fn doubt(&self, _packets: &[&[u8]]) -> Option<String> {
+        None
+    }
+
+    /// Bytes by which the header names the model, by place.
+    fn header(&self) -> Vec<(usize, u8)> {
+        Vec::new()
+    }
+
     /// Number of lasers.
     fn lasers(&self) -> usize;
 
@@ -217,6 +227,10 @@ impl<F: Family> Model for Rotating<F> {
         self.0.suits(packets)
     }
 
+    fn doubt(&self, packets: &[&[u8]]) -> Option<String> {
+        self.0.doubt(packets)
+    }
+
     fn fits(&self, payload: &[u8]) -> bool {
         self.view(payload).is_some()
     }
@@ -297,6 +311,11 @@ impl<F: Family> Model for Rotating<F> {
             "serial number {serial}, set to {rpm} rpm, clock source: {clock}"
         )];
         notes.extend(blank.then(|| "the unit describes itself without angles".into()));
+        let (told, own) = (difop.lasers(), self.0.lasers());
+        let is_more = own < 32 && told > own;
+        notes.extend(is_more.then(|| {
+            format!("the unit describes {told} lasers, of which the first {own} are taken")
+        }));
         UnitFacts {
             return_mode: self.0.mode(difop.return_mode()).map(ReturnMode::name),
             notes,
@@ -436,7 +455,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                 let Some(kind) = kind else { continue };
                 let echo = shot.echoes[index];
                 let range_m = f64::from(echo.range) * unit_m;
-                out.returns.push(Return {
+                out.cloud.push(&Return {
                     xyz_m: self.position(laser, range_m, azimuth_rad),
                     time: place.time + turn.start_ns(shot.firing) + shot.slot.delay_ns,
                     range_m: range_m as f32,

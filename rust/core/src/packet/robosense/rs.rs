@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 
 use super::difop::{Angles, Difop};
 use super::helios::{half_slot, halves_agree, returns_in_halves, returns_in_pairs};
-use super::layout::{CLASSIC_ID, Layout, Stamp, View, type_of};
+use super::layout::{CLASSIC_ID, Layout, Stamp, View, field, type_of};
 use super::rotating::{Family, Lens, Rotating, Slot};
 use super::table::Table;
 use crate::packet::ReturnMode;
@@ -36,8 +36,8 @@ pub static RS_32: Rotating<Rs> = Rotating(Rs::ThirtyTwo);
 impl Family for Rs {
     fn id(&self) -> &'static str {
         match self {
-            Self::Sixteen => "rs-16",
-            Self::ThirtyTwo => "rs-32",
+            Self::Sixteen => "rs16",
+            Self::ThirtyTwo => "rs32",
         }
     }
 
@@ -65,6 +65,14 @@ impl Family for Rs {
         let is_told = packets.iter().any(|payload| type_of(payload) != 0);
         let agree = halves_agree(self.layout(), packets);
         is_told || agree != Some(*self == Self::ThirtyTwo)
+    }
+
+    fn header(&self) -> Vec<(usize, u8)> {
+        let own = match self {
+            Self::Sixteen => 1,
+            Self::ThirtyTwo => 2,
+        };
+        vec![(field::TYPE.start, own)]
     }
 
     fn lasers(&self) -> usize {

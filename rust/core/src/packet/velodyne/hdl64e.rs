@@ -44,7 +44,7 @@ pub static HDL64E_S2: Hdl64e = Hdl64e {
 
 /// The HDL-64E S3.
 pub static HDL64E_S3: Hdl64e = Hdl64e {
-    id: "hdl64e-s3",
+    id: "hdl64e",
     title: "Velodyne HDL-64E S3",
     row_ns: 57_600,
     four_ns: 7_200,
@@ -291,7 +291,7 @@ impl Decoder for Hdl64eDecoder {
                     let Some(return_kind) = kind else { continue };
                     let (xyz_m, range_m) = channel.place(echo.range, add(head, channel.rotation));
                     out.encoder_rad.push(wrapped(row_rad + turned_rad));
-                    out.returns.push(Return {
+                    out.cloud.push(&Return {
                         xyz_m: xyz_m.map(|value| value as f32),
                         time: time + channel.delay_ns,
                         range_m: range_m as f32,

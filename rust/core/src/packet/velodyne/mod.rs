@@ -5,12 +5,14 @@
 mod calibration;
 pub mod hdl32e;
 pub mod hdl64e;
+mod lanes;
 pub mod position;
 pub mod puck;
-mod rotation;
+pub(super) mod rotation;
 mod rows;
 pub mod vlp32;
 pub mod vls128;
+pub mod writer;
 
 use crate::packet::echoes::RawEcho;
 use crate::packet::{Misfit, ReturnMode};
@@ -103,6 +105,15 @@ impl<'a> Packet<'a> {
         echoes.map(|bytes| RawReturn {
             range: u16::from_le_bytes([bytes[0], bytes[1]]),
             intensity: bytes[2],
+        })
+    }
+
+    /// The same, all at once.
+    pub fn echoes(&self, block: usize) -> [RawReturn; CHANNELS] {
+        let bytes = &self.block(block)[field::RETURNS];
+        std::array::from_fn(|k| RawReturn {
+            range: u16::from_le_bytes([bytes[3 * k], bytes[3 * k + 1]]),
+            intensity: bytes[3 * k + 2],
         })
     }
 

@@ -215,9 +215,8 @@ mod tests {
             mean_rate_rad_per_ns: 0.0,
         };
         decoder.decode(&bytes, place, &mut out);
-        let [echo] = out.returns[..] else {
-            panic!("{:?}", out.returns)
-        };
+        assert_eq!(out.cloud.len(), 1);
+        let echo = out.cloud.get(0);
         let delay_ns = FIRING_NS + 3 * LASER_NS;
         let azimuth = (80.8 + 0.4 * delay_ns as f64 / BLOCK_NS as f64).to_radians();
         let elevation = 3.0_f64.to_radians();

@@ -90,6 +90,7 @@ impl Rotation {
             self.left_out = Some(LeftOut {
                 after_rad,
                 width_rad,
+                is_instant: false,
             });
         }
     }

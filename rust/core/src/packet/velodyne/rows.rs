@@ -3,6 +3,7 @@
 //! In dual return two blocks hold the same shots: the first the last returns, the second the
 //! strongest (or the second strongest where the last is the strongest).
 
+use super::lanes::{Lanes, Row};
 use super::rotation::Rotation;
 use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
 use crate::cloud::{Return, ReturnKind};
@@ -61,9 +62,10 @@ impl Firing {
             let beam = &beams.channels()[place % self.lasers];
             Channel::new(beam, (place / self.lasers) as i64 * self.firing_ns)
         };
+        let channels = std::array::from_fn(channel);
         Ok(Box::new(RowsDecoder {
             firing: *self,
-            channels: std::array::from_fn(channel),
+            lanes: Lanes::new(&channels, self.range_unit_m),
         }))
     }
 
@@ -126,12 +128,12 @@ fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
 pub struct Channel {
     /// After the first shot of its row.
     pub delay_ns: i64,
-    azimuth_offset_rad: f64,
-    cos_elevation: f64,
-    sin_elevation: f64,
-    vertical_offset_m: f64,
-    range_offset_m: f64,
-    ring: u16,
+    pub(super) azimuth_offset_rad: f64,
+    pub(super) cos_elevation: f64,
+    pub(super) sin_elevation: f64,
+    pub(super) vertical_offset_m: f64,
+    pub(super) range_offset_m: f64,
+    pub(super) ring: u16,
 }
 
 impl Channel {
@@ -151,7 +153,7 @@ impl Channel {
 
 struct RowsDecoder {
     firing: Firing,
-    channels: [Channel; CHANNELS],
+    lanes: Lanes,
 }
 
 impl Decoder for RowsDecoder {
@@ -162,32 +164,25 @@ impl Decoder for RowsDecoder {
         let rotation = self.firing.rotation(&packet, place.mean_rate_rad_per_ns);
         let mode = packet.return_mode();
         let stride = mode.returns();
+        self.lanes.set_rate(rotation.rate_rad_per_ns());
         for row in 0..BLOCKS / stride {
             if !is_usable(&packet, row, stride) {
                 out.drops.add("block_invalid", stride as u64);
                 continue;
             }
-            let mut shots = Shots::new(
-                rotation.azimuth_rad(row),
-                rotation.rate_rad_per_ns(),
-                Place {
-                    time: place.time + rotation.start_ns(row),
-                    ..place
-                },
-                self.firing.range_unit_m,
-            );
             let block = row * stride;
+            let row = Row {
+                azimuth_rad: rotation.azimuth_rad(row),
+                time_ns: (place.time + rotation.start_ns(row)).0,
+                packet: place.packet,
+                block: block as u16,
+            };
+            let first = packet.echoes(block);
             if stride == 1 {
-                let kind = single_kind(mode);
-                for (channel, echo) in self.channels.iter().zip(packet.returns(block)) {
-                    shots.aim(channel);
-                    shots.echo(channel, echo, 0, kind, block, out);
-                }
-                continue;
-            }
-            let pairs = packet.returns(block).zip(packet.returns(block + 1));
-            for (channel, (last, strongest)) in self.channels.iter().zip(pairs) {
-                shots.pair(channel, [last, strongest], block, out);
+                self.lanes.push(row, &first, single_kind(mode), out);
+            } else {
+                let echoes = [&first, &packet.echoes(block + 1)];
+                self.lanes.push_pairs(row, echoes, out);
             }
         }
     }
@@ -267,7 +262,7 @@ impl Shots {
         let (sin, cos) = self.sin_cos;
         let height_m = range_m * channel.sin_elevation + channel.vertical_offset_m;
         out.encoder_rad.push(wrapped(self.encoder_rad));
-        out.returns.push(Return {
+        out.cloud.push(&Return {
             xyz_m: [
                 (level_m * cos) as f32,
                 (-level_m * sin) as f32,

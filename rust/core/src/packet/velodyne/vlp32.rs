@@ -11,20 +11,24 @@ use crate::packet::{Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Time from one pair of lasers to the next.
 pub const PAIR_NS: i64 = 2_304;
+/// Metres of one unit of range.
+pub const RANGE_UNIT_M: f64 = 0.004;
+/// Product byte of the VLP-32C.
+pub const PRODUCT_VLP32C: u8 = 0x28;
 /// Distance from the spin axis to where the beams cross.
 const FOCAL_DISTANCE_M: f64 = 0.0424;
 
 const FIRING: Firing = Firing {
     lasers: CHANNELS,
     firing_ns: 55_296,
-    range_unit_m: 0.004,
+    range_unit_m: RANGE_UNIT_M,
 };
 
 /// The VLP-32C.
 pub static VLP32C: Vlp32 = Vlp32 {
     id: "vlp32c",
     title: "Velodyne VLP-32C",
-    product: 0x28,
+    product: PRODUCT_VLP32C,
     elevation_deg: [
         -25.0, -1.0, -1.667, -15.639, -11.31, 0.0, -0.667, -8.843, -7.254, 0.333, -0.333, -6.148,
         -5.333, 1.333, 0.667, -4.0, -4.667, 1.667, 1.0, -3.667, -3.333, 3.333, 2.333, -2.667, -3.0,

@@ -33,7 +33,7 @@ const SLOT_NS: [i64; 3] = [2_665, 2_764, 2_890];
 /// The middle one.
 const USUAL_SLOT_NS: i64 = SLOT_NS[1];
 /// The first group fires so long before the packet's time.
-const LEAD_NS: i64 = 7_000;
+pub const LEAD_NS: i64 = 7_000;
 /// Distance from the spin axis to where the beams cross.
 const FOCAL_DISTANCE_M: f64 = 0.058_63;
 /// No rotor turns faster; 30 turns a second.

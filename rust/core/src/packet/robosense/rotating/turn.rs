@@ -203,6 +203,7 @@ impl Turn {
         self.gap.map(|(firing, width_rad)| LeftOut {
             after_rad: (firing + 1) as f64 * self.step_rad,
             width_rad,
+            is_instant: false,
         })
     }
 }

@@ -1,0 +1,1 @@
+"""Benches: how fast, how right. Run from the project's folder."""

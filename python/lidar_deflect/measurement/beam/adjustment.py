@@ -1,0 +1,185 @@
+"""Unloaded and loaded holds in one adjustment, from a start metres away to the last micrometre."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lidar_deflect import _native
+from lidar_deflect.errors import MeasurementError
+from lidar_deflect.measurement import paper
+from lidar_deflect.measurement.beam.drawing import drawing_of
+from lidar_deflect.measurement.beam.rig import rig_prior
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from lidar_deflect.holds import Hold
+    from lidar_deflect.measurement.beam.expected import Expected
+    from lidar_deflect.measurement.inputs import Inputs
+
+    Floats = NDArray[np.float64]
+
+MARGIN_NS = 150_000_000
+"""A hold begins so long after the load says so, and ends so long before: a ramp moves fast."""
+SHORTEST_NS = 700_000_000
+"""A shorter hold is no hold."""
+LONGEST_NS = 6_000_000_000
+"""More of a hold adds time, not accuracy."""
+SEEN_SHARE = 0.45
+"""The surface is free to differ from the drawing outboard of this share of the length."""
+ECHOES = 20_000
+"""Echoes of a hold that are used, evenly thinned."""
+
+LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
+BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
+ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
+"""Gates of echoes along and of edges across the ray, metres, while the blade is being found."""
+LAST = (0.05, 0.05)
+SETTLED = 0.05
+"""An unknown that moves by less than this share of its prior deviation has settled."""
+MAX_LAST = 12
+
+NOISE_M, SURFACE_M, EDGE_RAD = 0.015, 0.002, 1e-4
+
+
+@dataclass(frozen=True)
+class Solved:
+    """What the holds told.
+
+    Attributes
+    ----------
+    native
+        The adjustment, from which states follow.
+    holds, spans_ns, shares
+        Holds that took part, least load first, the stretches of them that were used, and their
+        loads as shares of full load.
+    told
+        What became of the data in the last step.
+    steps
+        Steps it took.
+    """
+
+    native: _native.BeamAdjustment
+    holds: tuple[Hold, ...]
+    spans_ns: tuple[tuple[int, int], ...]
+    shares: tuple[float, ...]
+    told: Mapping[str, Any]
+    steps: int
+
+
+def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
+    """Return holds with the stretch of each that is used, within the limits of the measurement."""
+    spans = []
+    for hold in holds:
+        start = max(hold.from_ns + MARGIN_NS, inputs.start_ns)
+        stop = min(hold.to_ns - MARGIN_NS, inputs.stop_ns, start + LONGEST_NS)
+        if stop - start >= SHORTEST_NS:
+            spans.append((hold, (start, stop)))
+    return spans
+
+
+def seen_in(inputs: Inputs, windows_ns: Sequence[tuple[int, int]]) -> list[_native.BeamSeen]:
+    """Read what the lidars saw of the blade in each window."""
+    plan = paper.plan_of(inputs)
+    return _native.beam_seen(
+        inputs.capture.native,
+        lidars=inputs.capture.numbers(inputs.lidars),
+        poses=np.array([inputs.calibration.pose(x).world_from_sensor for x in inputs.lidars]),
+        cut_azimuth_deg=[plan.cut_azimuth_deg[lidar] for lidar in inputs.lidars],
+        box_m=np.ascontiguousarray(plan.box_m),
+        windows_ns=list(windows_ns),
+        progress=inputs.listener("read"),
+    )
+
+
+def solve(inputs: Inputs, expected: Expected) -> Solved:
+    """Adjust all holds together.
+
+    Raises
+    ------
+    MeasurementError
+        If there is no hold, or the blade is not found in one.
+    """
+    used = spans_of(inputs, expected.holds)
+    if not used:
+        raise MeasurementError(
+            "the load never stands still for long enough",
+            code="measurement.no_hold",
+            hint="see the load channel; a hold lasts a second or more",
+        )
+    holds, spans = zip(*used, strict=True)
+    shares = tuple(expected.hold_share(hold) for hold in holds)
+    order = np.argsort([abs(share) for share in shares], kind="stable")
+    holds, spans = tuple(holds[i] for i in order), tuple(spans[i] for i in order)
+    shares = tuple(shares[i] for i in order)
+    native = _started(inputs, expected, spans, shares)
+    told, steps = _settle(native, inputs)
+    return Solved(native, holds, spans, shares, told, steps)
+
+
+def _started(
+    inputs: Inputs,
+    expected: Expected,
+    spans: Sequence[tuple[int, int]],
+    shares: Sequence[float],
+) -> _native.BeamAdjustment:
+    drawing = drawing_of(inputs.config)
+    forces = drawing.blade.forces_for(
+        expected.direction, expected.s_m.tolist(), expected.deflection_m.tolist()
+    )
+    if forces is None:
+        raise MeasurementError(
+            "no load bends the drawing as far as predicted",
+            code="measurement.no_start",
+            hint="check [prediction] against the stiffness of the geometry",
+        )
+    full_n = forces[:, None] * expected.direction
+    rig = rig_prior(inputs)
+    return _native.BeamAdjustment(
+        drawing.blade,
+        seen_in(inputs, spans),
+        spans_ns=list(spans),
+        forces_n=np.array(shares)[:, None, None] * full_n,
+        full_n=full_n,
+        poses=rig.poses,
+        channels=rig.channels,
+        rig_prior=rig.values,
+        rig_covariance=rig.covariance,
+        from_m=SEEN_SHARE * inputs.config.blade.length_m,
+        trust=drawing.trust,
+        shape_trust=drawing.shape_trust,
+        noise_m=NOISE_M,
+        surface_m=SURFACE_M,
+        edge_rad=EDGE_RAD,
+        echoes=ECHOES,
+        threads=inputs.threads,
+    )
+
+
+def _settle(native: _native.BeamAdjustment, inputs: Inputs) -> tuple[Mapping[str, Any], int]:
+    """Bring the blade nearer stage by stage, then until nothing moves any more."""
+    schedule = [*((*gate, "loads") for gate in LOADS), *((*gate, "blade") for gate in BLADE)]
+    schedule += [(*gate, "all") for gate in ALL]
+    listener = inputs.listener("adjust")
+    total = len(schedule) + MAX_LAST
+    for place, (echo_m, edge_m, stage) in enumerate(schedule):
+        told = native.step(echo_m, edge_m, stage)
+        with suppress(MeasurementError):  # a step too far is brought back by the next ones
+            native.linearise()
+        if listener:
+            listener(place + 1, total)
+    steps = len(schedule)
+    while told["largest"] > SETTLED and steps < total:
+        told = native.step(*LAST, "all")
+        steps += 1
+        if listener:
+            listener(steps, total)
+    if listener:
+        listener(total, total)
+    return told, steps

@@ -1,0 +1,146 @@
+"""States at every moment: in holds from the adjustment itself, between them stretch by stretch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lidar_deflect.measurement.beam.adjustment import LAST, seen_in
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from lidar_deflect.measurement.beam.adjustment import Solved
+    from lidar_deflect.measurement.beam.expected import Expected
+    from lidar_deflect.measurement.inputs import Inputs
+
+    Floats = NDArray[np.float64]
+    Times = NDArray[np.int64]
+
+STRETCH_NS = 800_000_000
+"""Time that is followed at once ..."""
+OVERLAP_NS = 250_000_000
+"""... and what of its neighbours helps it."""
+GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
+CHUNK = 48
+"""Stretches that are worked on between two looks at Ctrl-C."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """States of sections over time.
+
+    Attributes
+    ----------
+    values
+        x, y, z in metres and twist change in rad, shape (t, s, 4); NaN where nothing was found.
+    noise
+        Their variance from noise alone, the same shape.
+    used
+        Echoes that counted near each moment, shape (t, lidars).
+    in_hold
+        Number of the hold that each moment lies in, shape (t,); -1 between holds.
+    points
+        Columns of echoes that counted, to look at.
+    """
+
+    values: Floats
+    noise: Floats
+    used: NDArray[np.uint32]
+    in_hold: NDArray[np.int64]
+    points: Mapping[str, Any]
+
+
+def follow(
+    inputs: Inputs, expected: Expected, solved: Solved, s_m: Floats, times_ns: Times
+) -> Followed:
+    """Find the state of every section at every moment."""
+    shape = (len(times_ns), len(s_m), 4)
+    values, noise = np.full(shape, np.nan), np.zeros(shape)
+    used = np.zeros((len(times_ns), len(inputs.lidars)), dtype=np.uint32)
+    in_hold = np.full(len(times_ns), -1, dtype=np.int64)
+    half_ns = round(0.5e9 / inputs.rate_hz)
+    points: list[Mapping[str, Any]] = []
+    for number, (span, told) in enumerate(zip(solved.spans_ns, solved.told["holds"], strict=True)):
+        inside = np.flatnonzero((times_ns >= span[0]) & (times_ns <= span[1]))
+        found = solved.native.states(number, s_m.tolist(), times_ns[inside].tolist())
+        values[inside] = found.reshape(len(inside), len(s_m), 4)
+        used[inside] = _count(told, times_ns[inside], half_ns, len(inputs.lidars))
+        in_hold[inside] = number
+        points.append(told)
+    listener = inputs.listener("measure")
+    stretches = _stretches(times_ns, in_hold)
+    for start in range(0, len(stretches), CHUNK):
+        part = stretches[start : start + CHUNK]
+        for inside, result in zip(
+            part, _between(inputs, expected, solved, s_m, times_ns, part), strict=True
+        ):
+            if result is None:
+                continue
+            values[inside] = result[0].reshape(len(inside), len(s_m), 4)
+            noise[inside] = result[1].reshape(len(inside), len(s_m), 4)
+            used[inside] = _count(result[2], times_ns[inside], half_ns, len(inputs.lidars))
+            points.append(result[2])
+        if listener:
+            listener(start + len(part), len(stretches))
+    return Followed(values, noise, used, in_hold, _joined(points))
+
+
+def _stretches(times_ns: Times, in_hold: NDArray[np.int64]) -> list[NDArray[np.intp]]:
+    """Moments between holds, cut into stretches."""
+    between = np.flatnonzero(in_hold < 0)
+    if not between.size:
+        return []
+    breaks = [0]
+    for place in range(1, len(between)):
+        goes_on = between[place] == between[place - 1] + 1
+        length = times_ns[between[place]] - times_ns[between[breaks[-1]]]
+        if not goes_on or length >= STRETCH_NS:
+            breaks.append(place)
+    return np.split(between, breaks[1:])
+
+
+def _between(
+    inputs: Inputs,
+    expected: Expected,
+    solved: Solved,
+    s_m: Floats,
+    times_ns: Times,
+    stretches: Sequence[NDArray[np.intp]],
+) -> list[Any]:
+    spans = [
+        (int(times_ns[inside[0]]) - OVERLAP_NS, int(times_ns[inside[-1]]) + OVERLAP_NS)
+        for inside in stretches
+    ]
+    native = solved.native
+    return native.follow(
+        seen_in(inputs, spans),
+        spans,
+        [expected.at(native.load_knots(span)).tolist() for span in spans],
+        [times_ns[inside].tolist() for inside in stretches],
+        s_m.tolist(),
+        list(solved.shares),
+        list(GATES),
+    )
+
+
+def _count(
+    told: Mapping[str, Any], times_ns: Times, half_ns: int, lidars: int
+) -> NDArray[np.uint32]:
+    """Echoes that counted within half a period of each moment, by lidar."""
+    counts = np.zeros((len(times_ns), lidars), dtype=np.uint32)
+    for lidar in range(lidars):
+        of_lidar = np.sort(told["time_ns"][told["lidar"] == lidar])
+        counts[:, lidar] = np.searchsorted(of_lidar, times_ns + half_ns) - np.searchsorted(
+            of_lidar, times_ns - half_ns
+        )
+    return counts
+
+
+def _joined(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "xyz_m")
+    return {name: np.concatenate([part[name] for part in parts]) for name in names}

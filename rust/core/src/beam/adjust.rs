@@ -1,0 +1,435 @@
+//! One adjustment of all holds: states, surface, lidars and edges from rays, edges and what is known.
+
+use std::ops::Range;
+
+use nalgebra::{DVector, Vector3};
+use rayon::prelude::*;
+
+use super::axis::Axis;
+use super::echoes::Seen;
+use super::equilibrium::Physics;
+use super::family::{self, Kind, Loading, Response, Trust, Unknown};
+use super::layout::Layout;
+use super::mesh::Mesh;
+use super::normal::Normal;
+use super::posed::{Posed, knots};
+use super::rig::{Lidar, Rig};
+use super::rows::{Rows, Tally, Weights};
+use super::shape::Shape;
+use super::track::zeros;
+use crate::error::BeamError;
+
+/// Standard deviations of the sway in its first mode in x and y and in its second, metres at the tip.
+const SWAY_M: [f64; 4] = [0.05, 0.05, 0.015, 0.015];
+/// Time between two knots of the sway in a hold, nanoseconds.
+const KNOT_NS: i64 = 200_000_000;
+/// Largest step of an unknown, standard deviations: farther away the neighbours are not linear.
+const LARGEST_STEP: f64 = 3.0;
+/// Standard deviation of how far edges lie outside of the silhouette, rad.
+pub const EDGE_RAD: f64 = 1e-3;
+/// The same of one hold, lidar and side against all, rad.
+pub const EDGE_OFFSET_RAD: f64 = 1e-4;
+
+/// Data are taken for no better than this share of the gate while the gate is wide.
+const COARSE: f64 = 0.1;
+
+/// Inverse variance of what is held, against 1 of what is free.
+const HELD: f64 = 1e6;
+
+/// A hold as it enters the adjustment.
+#[derive(Debug, Clone)]
+pub struct Hold {
+    /// What was seen in it.
+    pub seen: Seen,
+    /// First and last instant, nanoseconds.
+    pub span_ns: (i64, i64),
+    /// Loads as they are thought to be.
+    pub loading: Loading,
+}
+
+/// Everything that does not change during an adjustment.
+#[derive(Debug, Clone)]
+pub struct Problem {
+    /// The blade.
+    pub mesh: Mesh,
+    /// Nodes where load enters.
+    pub saddles: Vec<usize>,
+    /// How well the blade is known.
+    pub trust: Trust,
+    /// Its surface.
+    pub shape: Shape,
+    /// Force of full load at each saddle, newtons, world.
+    pub full_n: Vec<Vector3<f64>>,
+    /// The holds in time order.
+    pub holds: Vec<Hold>,
+}
+
+/// How far from the model data may lie while it is still being found, metres.
+#[derive(Debug, Clone, Copy)]
+pub struct Gates {
+    /// Of echoes along their ray.
+    pub echo_m: f64,
+    /// Of edges across it.
+    pub edge_m: f64,
+    /// What may change.
+    pub stage: Stage,
+}
+
+/// What may change while the blade is being found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Stage {
+    /// Forces and weight alone: nothing else can bring a blade that is metres away nearer.
+    Loads,
+    /// The blade, not yet lidars and surface, or saddles would bend them.
+    Blade,
+    /// Everything.
+    All,
+}
+
+/// A state of which the neighbours are known.
+#[derive(Debug, Clone)]
+struct Linear {
+    curvature: Vec<Vector3<f64>>,
+    values: DVector<f64>,
+    responses: Vec<Response>,
+    sway: Vec<Response>,
+}
+
+/// The unknowns as estimated so far.
+#[derive(Debug, Clone)]
+pub struct Adjustment {
+    /// What it works on.
+    pub problem: Problem,
+    /// Where each unknown stands.
+    pub layout: Layout,
+    /// The lidars.
+    pub rig: Rig,
+    /// All unknowns but the lidars', in standard deviations.
+    pub values: DVector<f64>,
+    /// How data are weighted.
+    pub weights: Weights,
+    /// Which unknowns are solved for.
+    pub free: Range<usize>,
+    /// Standard deviation of each mode in time, in its own unit.
+    pub modes_m: Vec<f64>,
+    /// Expected values before the data, in standard deviations, and their weights.
+    pub(super) expected: DVector<f64>,
+    pub(super) tightness: DVector<f64>,
+    /// Time between two knots, nanoseconds.
+    pub(super) knot_ns: i64,
+    /// Whether the first mode in time is the load.
+    pub(super) follows_load: bool,
+    pub(super) shared: Vec<Unknown>,
+    pub(super) own: Vec<Vec<Unknown>>,
+    linear: Vec<Linear>,
+}
+
+/// What one iteration did.
+#[derive(Debug, Clone)]
+pub struct Step {
+    /// Largest change of an unknown of the blade, standard deviations.
+    pub largest: f64,
+    /// What became of the data, by hold.
+    pub tallies: Vec<Tally>,
+}
+
+impl Adjustment {
+    /// Starts from the loads as they are thought to be.
+    ///
+    /// # Errors
+    /// [`BeamError::Unsettled`] where a load has no equilibrium.
+    pub fn new(problem: Problem, rig: Rig, weights: Weights) -> Result<Self, BeamError> {
+        let shared = family::shared_unknowns(&problem.trust);
+        let own = |hold: &Hold| family::hold_unknowns(&hold.loading, &problem.trust);
+        let own: Vec<Vec<Unknown>> = problem.holds.iter().map(own).collect();
+        let span = |hold: &Hold| knots(hold.span_ns, KNOT_NS);
+        let layout = Layout {
+            shared: shared.len(),
+            own: own.iter().map(Vec::len).collect(),
+            knots: problem.holds.iter().map(span).collect(),
+            modes: SWAY_M.len(),
+            channels: rig.channels.clone(),
+            shape: problem.shape.len(),
+        };
+        let mut adjustment = Self {
+            values: DVector::zeros(layout.len()),
+            expected: DVector::zeros(layout.len()),
+            tightness: DVector::repeat(layout.len(), 1.0),
+            free: 0..layout.len(),
+            modes_m: SWAY_M.to_vec(),
+            knot_ns: KNOT_NS,
+            follows_load: false,
+            layout,
+            rig,
+            weights,
+            shared,
+            own,
+            linear: Vec::new(),
+            problem,
+        };
+        adjustment.linearise()?;
+        Ok(adjustment)
+    }
+
+    /// Solves the equilibria of all holds anew and how their neighbours differ.
+    ///
+    /// # Errors
+    /// [`BeamError::Unsettled`] where a load has no equilibrium.
+    pub fn linearise(&mut self) -> Result<(), BeamError> {
+        let holds = 0..self.problem.holds.len();
+        let all: Option<Vec<Linear>> = holds
+            .into_par_iter()
+            .map(|hold| self.linear_of(hold))
+            .collect();
+        self.linear = all.ok_or(BeamError::Unsettled)?;
+        Ok(())
+    }
+
+    fn linear_of(&self, hold: usize) -> Option<Linear> {
+        let mesh = &self.problem.mesh;
+        let physics = self.physics(hold);
+        let start = match self.linear.get(hold) {
+            Some(linear) => linear.curvature.clone(),
+            None => mesh.free.clone(),
+        };
+        let at = physics.solve(mesh, &start)?;
+        let mut responses = family::responses(mesh, &physics, &at, &self.shared)?;
+        responses.extend(self.own_responses(hold, &physics, &at, &responses)?);
+        let mut sway = family::sway_responses(mesh, &at);
+        if self.follows_load {
+            let load = Unknown {
+                kind: Kind::Load,
+                sigma: 1.0,
+            };
+            sway.insert(0, family::responses(mesh, &physics, &at, &[load])?.pop()?);
+        }
+        Some(Linear {
+            sway,
+            curvature: at.curvature,
+            values: self.state(hold),
+            responses,
+        })
+    }
+
+    /// Responses of a hold's own unknowns; those of the stiffness are the shared ones scaled.
+    fn own_responses(
+        &self,
+        hold: usize,
+        physics: &Physics,
+        at: &Axis,
+        shared: &[Response],
+    ) -> Option<Vec<Response>> {
+        let respond = |unknown: &Unknown| {
+            let same = self.shared.iter().position(|s| s.kind == unknown.kind);
+            if let Some(place) = same.filter(|_| matches!(unknown.kind, Kind::Soft { .. })) {
+                let scale = unknown.sigma / self.shared[place].sigma;
+                return Some(shared[place].scaled(scale));
+            }
+            family::responses(&self.problem.mesh, physics, at, &[*unknown])?.pop()
+        };
+        self.own[hold].iter().map(respond).collect()
+    }
+
+    /// Everything that bends the blade in a hold, as estimated so far.
+    pub(super) fn physics(&self, hold: usize) -> Physics {
+        let problem = &self.problem;
+        let mut physics = Physics::unloaded(&problem.mesh, &problem.saddles);
+        for (place, force) in physics
+            .forces
+            .iter_mut()
+            .zip(&problem.holds[hold].loading.force_n)
+        {
+            place.1 += force;
+        }
+        physics.full.clone_from(&problem.full_n);
+        let state = self.state(hold);
+        let unknowns = self.shared.iter().chain(&self.own[hold]);
+        for (unknown, value) in unknowns.zip(state.iter()) {
+            family::add(
+                &mut physics,
+                &problem.mesh,
+                unknown.kind,
+                unknown.sigma * value,
+            );
+        }
+        physics
+    }
+
+    /// Another problem with these lidars and weights, without values.
+    pub(super) fn like(&self, problem: Problem, layout: Layout) -> Self {
+        Self {
+            values: zeros(layout.len()),
+            expected: zeros(layout.len()),
+            tightness: DVector::repeat(layout.len(), 1.0),
+            linear: Vec::new(),
+            problem,
+            layout,
+            ..self.clone()
+        }
+    }
+
+    /// Changes one unknown: those of the lidars in their own unit, others in standard deviations.
+    pub fn shift(&mut self, unknown: usize, change: f64) {
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        if (rig..rig + count).contains(&unknown) {
+            self.rig.values[unknown - rig] += change;
+        } else {
+            self.values[unknown] += change;
+        }
+    }
+
+    /// Shared and own unknowns of a hold.
+    fn state(&self, hold: usize) -> DVector<f64> {
+        let own = self
+            .values
+            .rows(self.layout.own_at(hold), self.layout.own[hold]);
+        let shared = self.values.rows(0, self.layout.shared);
+        let both = shared.iter().chain(own.iter()).copied();
+        DVector::from_iterator(self.layout.shared + self.layout.own[hold], both)
+    }
+
+    /// Numbers of the unknowns of a hold's state, in the order of its responses.
+    pub fn state_at(&self, hold: usize) -> Vec<usize> {
+        let own = self.layout.own_at(hold);
+        (0..self.layout.shared)
+            .chain(own..own + self.layout.own[hold])
+            .collect()
+    }
+
+    /// The blade of a hold as estimated so far.
+    pub fn posed(&self, hold: usize) -> Posed {
+        let (linear, problem) = (&self.linear[hold], &self.problem);
+        let change = self.state(hold) - &linear.values;
+        let mut curvature = linear.curvature.clone();
+        let mut root = Vector3::zeros();
+        for (response, amount) in linear.responses.iter().zip(change.iter()) {
+            let parts = curvature.iter_mut().zip(&response.curvature);
+            parts.for_each(|(bend, part)| *bend += part * *amount);
+        }
+        for (response, amount) in linear.responses.iter().zip(self.state(hold).iter()) {
+            root += response.root_rad * *amount;
+        }
+        let turn = nalgebra::Rotation3::from_scaled_axis(root).matrix() * problem.mesh.root;
+        let still = Axis::integrate(&turn, &problem.mesh.s_m, curvature);
+        let at = self.layout.sway_at(hold);
+        let coefficients: Vec<f64> = (0..self.layout.modes * self.layout.knots[hold])
+            .map(|k| self.values[at + k] * self.modes_m[k / self.layout.knots[hold]])
+            .collect();
+        let span = problem.holds[hold].span_ns;
+        Posed::new(
+            &problem.mesh,
+            still,
+            &linear.responses,
+            &linear.sway,
+            &coefficients,
+            span,
+            self.knot_ns,
+        )
+    }
+
+    /// One step of Gauss and Newton with data inside of the gates.
+    ///
+    /// # Errors
+    /// [`BeamError::Singular`].
+    pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
+        let (normal, tallies) = self.normal(gates);
+        let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
+        let mut step = DVector::zeros(self.layout.len());
+        step.rows_mut(self.free.start, self.free.len())
+            .copy_from(&part);
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        let largest = step.rows(0, self.layout.sway_at(0)).amax();
+        if largest > LARGEST_STEP {
+            step *= LARGEST_STEP / largest;
+        }
+        self.values += &step;
+        self.rig.values += step.rows(rig, count);
+        self.values.rows_mut(rig, count).fill(0.0);
+        if gates.stage == Stage::All {
+            self.weights.learn(&tallies);
+        }
+        Ok(Step { largest, tallies })
+    }
+
+    /// Normal equations at the present unknowns, with what became of the data.
+    pub fn normal(&self, gates: &Gates) -> (Normal, Vec<Tally>) {
+        let lidars: Vec<Lidar> = (0..self.rig.poses.len())
+            .map(|l| self.rig.lidar(l))
+            .collect();
+        let parts: Vec<(Normal, Tally)> = (0..self.problem.holds.len())
+            .into_par_iter()
+            .map(|hold| Rows::new(self, hold, &lidars, gates).collect())
+            .collect();
+        let mut sum = self.prior(gates.stage);
+        let mut tallies = Vec::new();
+        for (normal, tally) in parts {
+            sum.join(&normal);
+            tallies.push(tally);
+        }
+        (sum, tallies)
+    }
+
+    /// The first stage at which an unknown may change.
+    fn needs(&self, unknown: usize) -> Stage {
+        if unknown >= self.layout.lidar_at(0) {
+            return Stage::All;
+        }
+        let kind = if unknown < self.layout.shared {
+            Some(self.shared[unknown].kind)
+        } else {
+            self.own
+                .iter()
+                .flatten()
+                .nth(unknown - self.layout.shared)
+                .map(|own| own.kind)
+        };
+        match kind {
+            Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
+            _ => Stage::Blade,
+        }
+    }
+
+    /// What is known before the data.
+    fn prior(&self, stage: Stage) -> Normal {
+        let mut prior = Normal::new(self.free.clone());
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        for (place, i) in self.free.clone().enumerate() {
+            let is_held = self.needs(i) > stage;
+            let tight = if is_held { HELD } else { self.tightness[i] };
+            prior.matrix[(place, place)] = tight;
+            prior.right[place] = tight * (self.expected[i] - self.values[i]);
+        }
+        if self.free.contains(&rig) {
+            let at = rig - self.free.start;
+            let hold = if stage == Stage::All { 1.0 } else { HELD };
+            let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
+            let information = &self.rig.information * hold;
+            prior
+                .matrix
+                .view_mut((at, at), (count, count))
+                .copy_from(&information);
+            prior.right.rows_mut(at, count).copy_from(&(pull * hold));
+        }
+        prior
+    }
+}
+
+impl Gates {
+    /// Standard deviation below which no echo and no edge is taken to be, metres.
+    pub fn coarse_m(&self) -> [f64; 2] {
+        match self.stage {
+            Stage::All => [0.0; 2],
+            _ => [COARSE * self.echo_m, COARSE * self.edge_m],
+        }
+    }
+}
+
+impl Response {
+    /// The response to another standard deviation.
+    fn scaled(&self, scale: f64) -> Self {
+        Self {
+            curvature: self.curvature.iter().map(|bend| bend * scale).collect(),
+            root_rad: self.root_rad * scale,
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! Which states a blade can have: the unknowns of loads, weight, stiffness and prebend, how well each
+//! is known beforehand, and the field by which each moves the blade.
+
+use std::f64::consts::PI;
+
+use nalgebra::Vector3;
+
+use super::axis::{Axis, Field};
+use super::equilibrium::Physics;
+use super::mesh::Mesh;
+
+/// Smooth functions along the span per quantity that is known only roughly.
+pub const SPAN_MODES: usize = 5;
+
+/// What an unknown changes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// World force at a saddle, newtons.
+    Force {
+        /// Number of the saddle.
+        saddle: usize,
+        /// World axis.
+        axis: usize,
+    },
+    /// Moment about the tangent at a saddle, newton metres.
+    Couple {
+        /// Number of the saddle.
+        saddle: usize,
+    },
+    /// Load, as a share of full load.
+    Load,
+    /// Weight, relative, as a function along the span.
+    Weight(usize),
+    /// Compliance, relative: 0 edgewise, 1 flapwise, 2 torsion; as a function along the span.
+    Soft {
+        /// Which of the three.
+        which: usize,
+        /// Number of the function along the span.
+        mode: usize,
+    },
+    /// Stress-free curvature about the section's first or second direction, rad/m.
+    Free {
+        /// Direction of the section.
+        axis: usize,
+        /// Number of the function along the span.
+        mode: usize,
+    },
+    /// Prebend, relative.
+    Prebend,
+    /// Rotation of the root about a world axis, rad.
+    Root {
+        /// World axis.
+        axis: usize,
+    },
+}
+
+/// One unknown with its standard deviation before any data, in its own unit.
+#[derive(Debug, Clone, Copy)]
+pub struct Unknown {
+    /// What it changes.
+    pub kind: Kind,
+    /// Standard deviation before the data.
+    pub sigma: f64,
+}
+
+/// How well a drawing is known beforehand.
+#[derive(Debug, Clone, Copy)]
+pub struct Trust {
+    /// Relative standard deviation of the stiffness as a whole; its waves along the span have 0.6 of it.
+    pub stiffness: f64,
+    /// Relative standard deviation of the weight.
+    pub weight: f64,
+    /// Relative standard deviation of the prebend.
+    pub prebend: f64,
+    /// Standard deviation of each function of stress-free curvature, rad/m.
+    pub free_rad_m: f64,
+    /// Standard deviation of the root's rotation, rad.
+    pub root_rad: f64,
+}
+
+impl Default for Trust {
+    /// A drawing with stiffness, as designers give it.
+    fn default() -> Self {
+        Self {
+            stiffness: 0.05,
+            weight: 0.5,
+            prebend: 0.05,
+            free_rad_m: 1.5e-5,
+            root_rad: 1e-3,
+        }
+    }
+}
+
+/// Unknowns that all states of one blade share.
+pub fn shared_unknowns(trust: &Trust) -> Vec<Unknown> {
+    let mut unknowns = Vec::new();
+    let mut add = |kind, sigma| unknowns.push(Unknown { kind, sigma });
+    for mode in 0..SPAN_MODES {
+        let wave = if mode == 0 { 1.0 } else { 0.6 };
+        add(Kind::Weight(mode), trust.weight * wave);
+        for which in 0..3 {
+            add(Kind::Soft { which, mode }, trust.stiffness * wave);
+        }
+        for axis in 0..2 {
+            add(Kind::Free { axis, mode }, trust.free_rad_m);
+        }
+    }
+    add(Kind::Prebend, trust.prebend);
+    unknowns
+}
+
+/// Loads as they are thought to be before the data.
+#[derive(Debug, Clone)]
+pub struct Loading {
+    /// Force at each saddle, newtons, world.
+    pub force_n: Vec<Vector3<f64>>,
+    /// Sum of the forces at full load, newtons.
+    pub full_n: f64,
+}
+
+/// Share of full load that cables and saddles put on the blade whatever the load channel says.
+const IDLE_SHARE: f64 = 0.01;
+/// Relative standard deviation of how the load is spread over the saddles.
+const SPREAD: f64 = 0.8;
+/// Relative standard deviation of what the load has across its direction.
+const SIDEWAYS: f64 = 0.4;
+/// Lever of a saddle's pull about the axis, metres.
+const LEVER_M: f64 = 0.6;
+
+/// Unknowns of one state: its loads, its root, and what the shared ones do not tell.
+pub fn hold_unknowns(loading: &Loading, trust: &Trust) -> Vec<Unknown> {
+    let mut unknowns = Vec::new();
+    let mut add = |kind, sigma| unknowns.push(Unknown { kind, sigma });
+    let idle = IDLE_SHARE * loading.full_n;
+    for (saddle, force) in loading.force_n.iter().enumerate() {
+        let pull = force.norm();
+        for axis in 0..3 {
+            let along = SPREAD * force[axis].abs();
+            let sigma = along.hypot(SIDEWAYS * pull).hypot(idle);
+            add(Kind::Force { saddle, axis }, sigma);
+        }
+        add(Kind::Couple { saddle }, LEVER_M * pull.hypot(idle));
+    }
+    for axis in 0..3 {
+        add(Kind::Root { axis }, trust.root_rad);
+    }
+    for mode in 0..SPAN_MODES {
+        for which in 0..3 {
+            add(Kind::Soft { which, mode }, 0.1 * trust.stiffness);
+        }
+    }
+    unknowns
+}
+
+/// A function along the span, `x` from root to tip in 0 to 1.
+fn span_mode(mode: usize, x: f64) -> f64 {
+    (PI * mode as f64 * x).cos()
+}
+
+/// Physics with `value` of one unknown added, in its own unit.
+pub fn add(physics: &mut Physics, mesh: &Mesh, kind: Kind, value: f64) {
+    let length = mesh.length_m();
+    let wave = |element: usize, mode: usize| {
+        span_mode(
+            mode,
+            0.5 * (mesh.s_m[element] + mesh.s_m[element + 1]) / length,
+        )
+    };
+    let elements = 0..mesh.len() - 1;
+    match kind {
+        Kind::Force { saddle, axis } => physics.forces[saddle].1[axis] += value,
+        Kind::Load => {
+            let places = physics.forces.iter_mut().zip(&physics.full);
+            places.for_each(|(place, full)| place.1 += full * value);
+        }
+        Kind::Couple { saddle } => physics.couples_nm[saddle] += value,
+        Kind::Weight(mode) => elements.for_each(|e| physics.weight[e] += value * wave(e, mode)),
+        Kind::Soft { which, mode } => {
+            elements.for_each(|e| physics.soft[which][e] += value * wave(e, mode));
+        }
+        Kind::Free { axis, mode } => {
+            elements.for_each(|e| physics.free[e][axis] += value * wave(e, mode));
+        }
+        Kind::Prebend => physics.prebend += value,
+        Kind::Root { axis } => physics.root_rad[axis] += value,
+    }
+}
+
+/// Change of curvature by one standard deviation of each unknown, and of the root's rotation.
+#[derive(Debug, Clone)]
+pub struct Response {
+    /// By element, rad/m.
+    pub curvature: Vec<Vector3<f64>>,
+    /// World, rad.
+    pub root_rad: Vector3<f64>,
+}
+
+/// Step of the differences, standard deviations: small, for sag and load are not linear.
+const STEP: f64 = 0.02;
+
+/// Responses of an equilibrium to each of `unknowns`, per standard deviation.
+///
+/// `None` where a neighbouring state does not settle.
+pub fn responses(
+    mesh: &Mesh,
+    physics: &Physics,
+    at: &Axis,
+    unknowns: &[Unknown],
+) -> Option<Vec<Response>> {
+    let respond = |unknown: &Unknown| {
+        let side = |step: f64| {
+            let mut physics = physics.clone();
+            add(&mut physics, mesh, unknown.kind, step * unknown.sigma);
+            physics.solve(mesh, &at.curvature)
+        };
+        let (ahead, behind) = (side(STEP)?, side(-STEP)?);
+        let slope = |(a, b): (&Vector3<f64>, &Vector3<f64>)| (a - b) / (2.0 * STEP);
+        let root_rad = match unknown.kind {
+            Kind::Root { axis } => Vector3::ith(axis, unknown.sigma),
+            _ => Vector3::zeros(),
+        };
+        Some(Response {
+            curvature: ahead
+                .curvature
+                .iter()
+                .zip(&behind.curvature)
+                .map(slope)
+                .collect(),
+            root_rad,
+        })
+    };
+    unknowns.iter().map(respond).collect()
+}
+
+/// What each response moves at a shape.
+pub fn fields(mesh: &Mesh, at: &Axis, responses: &[Response]) -> Vec<Field> {
+    let field = |r: &Response| at.field(&mesh.s_m, &r.curvature, &r.root_rad);
+    responses.iter().map(field).collect()
+}
+
+/// Curvatures of the sway: the blade under the inertia of its first two modes in x and in y, scaled
+/// to one metre at the tip.
+pub fn sway_responses(mesh: &Mesh, at: &Axis) -> Vec<Response> {
+    let mut responses = Vec::new();
+    for order in [1, 2] {
+        for axis in [0, 1] {
+            responses.push(sway_response(mesh, at, order, &Vector3::ith(axis, 1.0)));
+        }
+    }
+    responses
+}
+
+fn sway_shape(order: usize, x: f64) -> f64 {
+    if order == 1 {
+        x * x
+    } else {
+        x * x * (4.0 * x - 3.0)
+    }
+}
+
+fn sway_response(mesh: &Mesh, at: &Axis, order: usize, direction: &Vector3<f64>) -> Response {
+    let (mut force, mut about) = (Vector3::zeros(), Vector3::<f64>::zeros());
+    let mut curvature = vec![Vector3::zeros(); mesh.len() - 1];
+    for e in (0..mesh.len() - 1).rev() {
+        let x = 0.5 * (mesh.s_m[e] + mesh.s_m[e + 1]) / mesh.length_m();
+        let middle = 0.5 * (at.place[e] + at.place[e + 1]);
+        let inertia = direction * (mesh.mass_kg_m[e] * mesh.step_m(e) * sway_shape(order, x));
+        force += inertia;
+        about += middle.cross(&inertia);
+        let turn = 0.5 * (at.turn[e] + at.turn[e + 1]);
+        let moment = turn.tr_mul(&(about - middle.cross(&force)));
+        let [edge, flap, torsion] = &mesh.compliance[e];
+        curvature[e] = (edge + flap + torsion) * moment;
+    }
+    let still = Vector3::zeros();
+    let tip = at.field(&mesh.s_m, &curvature, &still).place[mesh.len() - 1];
+    curvature.iter_mut().for_each(|bend| *bend /= tip.norm());
+    Response {
+        curvature,
+        root_rad: still,
+    }
+}

@@ -1,0 +1,27 @@
+//! The beam method: a blade that bends as blades bend, fitted to rays and edges of all lidars.
+//!
+//! [`design`] and [`mesh`] hold the drawing, [`equilibrium`] and [`family`] say which states it can
+//! have, [`axis`] keeps its length, [`sight`] meets it with rays and scan planes, [`adjust`] puts
+//! everything into one adjustment. Source: docs/method.md.
+
+pub mod adjust;
+pub mod axis;
+pub mod design;
+pub mod echoes;
+pub mod equilibrium;
+pub mod family;
+pub mod gather;
+pub mod layout;
+pub mod mesh;
+pub mod normal;
+pub mod posed;
+pub mod rig;
+pub mod rows;
+#[cfg(test)]
+mod sample;
+pub mod sections;
+pub mod shape;
+pub mod sight;
+pub mod start;
+mod table;
+pub mod track;

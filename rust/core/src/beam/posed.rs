@@ -1,0 +1,162 @@
+//! A hold as the present unknowns have it: the blade at all its instants, and what moves it.
+
+use nalgebra::Vector3;
+
+use super::axis::{Axis, Field};
+use super::family::Response;
+use super::mesh::Mesh;
+use super::shape::splines;
+use super::sight::{Instant, Section};
+
+/// Time between two shapes of the blade, nanoseconds; linear in between.
+const GRID_NS: i64 = 20_000_000;
+/// Coefficients of cubic splines with knots so far apart over a span of time.
+pub fn knots(span_ns: (i64, i64), knot_ns: i64) -> usize {
+    ((span_ns.1 - span_ns.0).max(0) / knot_ns) as usize + 4
+}
+
+/// The blade of one hold.
+#[derive(Debug, Clone)]
+pub struct Posed {
+    start_ns: i64,
+    knot_ns: i64,
+    shapes: Vec<Axis>,
+    /// Without sway.
+    pub still: Axis,
+    /// Six numbers per node and unknown: rotation and displacement.
+    moves: Vec<[f64; 6]>,
+    sway_moves: Vec<[f64; 6]>,
+    unknowns: usize,
+    modes: usize,
+    knots: usize,
+}
+
+/// Times at which sway is wanted: four knots and their weights.
+pub type Beat = (usize, [f64; 4]);
+
+impl Posed {
+    /// Poses the blade: curvatures without sway, `responses` of the unknowns, `sway` responses with
+    /// their coefficients (knots by mode), between two instants.
+    pub fn new(
+        mesh: &Mesh,
+        still: Axis,
+        responses: &[Response],
+        sway: &[Response],
+        coefficients: &[f64],
+        span_ns: (i64, i64),
+        knot_ns: i64,
+    ) -> Self {
+        let fields = |all: &[Response]| -> Vec<Field> {
+            all.iter()
+                .map(|r| still.field(&mesh.s_m, &r.curvature, &r.root_rad))
+                .collect()
+        };
+        let knots = knots(span_ns, knot_ns);
+        let steps = (span_ns.1 - span_ns.0) / GRID_NS + 2;
+        let shape = |step: i64| {
+            let (first, weights) = splines((step * GRID_NS) as f64 / knot_ns as f64, knots);
+            let mut curvature = still.curvature.clone();
+            for (mode, response) in sway.iter().enumerate() {
+                let of = &coefficients[mode * knots..][..knots];
+                let amount: f64 = (0..4).map(|k| weights[k] * of[first + k]).sum();
+                let parts = curvature.iter_mut().zip(&response.curvature);
+                parts.for_each(|(bend, part)| *bend += part * amount);
+            }
+            Axis::integrate(&still.turn[0], &mesh.s_m, curvature)
+        };
+        Self {
+            start_ns: span_ns.0,
+            knot_ns,
+            shapes: (0..steps).map(shape).collect(),
+            moves: flat(mesh, &fields(responses)),
+            sway_moves: flat(mesh, &fields(sway)),
+            unknowns: responses.len(),
+            modes: sway.len(),
+            knots,
+            still,
+        }
+    }
+
+    /// The blade at an instant.
+    pub fn at(&self, time_ns: i64) -> Instant<'_> {
+        let last = self.shapes.len() as i64 - 2;
+        let step = ((time_ns - self.start_ns) / GRID_NS).clamp(0, last);
+        let share = (time_ns - self.start_ns - step * GRID_NS) as f64 / GRID_NS as f64;
+        Instant {
+            before: &self.shapes[step as usize],
+            after: &self.shapes[step as usize + 1],
+            share: share.clamp(0.0, 1.0),
+        }
+    }
+
+    /// The blade without sway.
+    pub fn at_rest(&self) -> Instant<'_> {
+        Instant {
+            before: &self.still,
+            after: &self.still,
+            share: 0.0,
+        }
+    }
+
+    /// Knots of the sway at an instant.
+    pub fn beat(&self, time_ns: i64) -> Beat {
+        splines(
+            (time_ns - self.start_ns) as f64 / self.knot_ns as f64,
+            self.knots,
+        )
+    }
+
+    /// How far each unknown of the state moves `along . displacement + about . rotation` of a
+    /// section, in the order of the responses.
+    pub fn slopes(
+        &self,
+        section: &Section,
+        along: &Vector3<f64>,
+        about: &Vector3<f64>,
+    ) -> impl Iterator<Item = f64> {
+        project(&self.moves, self.unknowns, section, along, about)
+    }
+
+    /// The same for the sway, per mode.
+    pub fn sway_slopes(
+        &self,
+        section: &Section,
+        along: &Vector3<f64>,
+        about: &Vector3<f64>,
+    ) -> impl Iterator<Item = f64> {
+        project(&self.sway_moves, self.modes, section, along, about)
+    }
+
+    /// Coefficients of the sway per mode.
+    pub fn knots(&self) -> usize {
+        self.knots
+    }
+}
+
+fn flat(mesh: &Mesh, fields: &[Field]) -> Vec<[f64; 6]> {
+    let at = |node: usize| {
+        fields.iter().map(move |field| {
+            let (turn, place) = (&field.turn[node], &field.place[node]);
+            [turn.x, turn.y, turn.z, place.x, place.y, place.z]
+        })
+    };
+    (0..mesh.len()).flat_map(at).collect()
+}
+
+fn project<'a>(
+    moves: &'a [[f64; 6]],
+    count: usize,
+    section: &Section,
+    along: &Vector3<f64>,
+    about: &Vector3<f64>,
+) -> impl Iterator<Item = f64> + 'a {
+    let inner = &moves[section.node * count..][..count];
+    let outer = &moves[(section.node + 1) * count..][..count];
+    let weights = [about.x, about.y, about.z, along.x, along.y, along.z];
+    let (low, high) = (1.0 - section.share, section.share);
+    inner.iter().zip(outer).map(move |(a, b)| {
+        (0..6)
+            .map(|k| weights[k] * (low * a[k] + high * b[k]))
+            .sum()
+    })
+}

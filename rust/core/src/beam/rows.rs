@@ -1,0 +1,385 @@
+//! Echoes and edges of one hold as rows of the normal equations.
+
+use nalgebra::Vector3;
+
+use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates};
+use super::echoes::{Echo, Edge};
+use super::layout::RIG;
+use super::normal::Normal;
+use super::posed::Posed;
+use super::rig::Lidar;
+use super::sight::{Contact, Hit, ScanPlane, Silhouette};
+
+/// Echoes nearer to the end of their run than this are mixed with what lies behind.
+const MIXED_ECHOES: u32 = 2;
+/// Rays that meet the surface at a flatter angle are left out, cosine of incidence.
+const FLATTEST_COSINE: f64 = 0.25;
+/// An edge beside facets seen at a grazing angle over more than this is soft, metres across.
+const SOFT_M: f64 = 0.012;
+/// Residuals beyond so many standard deviations count less.
+const ROBUST: f64 = 3.0;
+
+/// How data are weighted.
+#[derive(Debug, Clone)]
+pub struct Weights {
+    /// Standard deviation of a range of each lidar, metres.
+    pub noise_m: Vec<f64>,
+    /// Standard deviation of the surface about its model, along the normal, metres.
+    pub surface_m: f64,
+    /// Standard deviation of an edge beyond that of the step between shots, rad.
+    pub edge_rad: f64,
+    /// At most so many echoes of a hold are used.
+    pub echoes: usize,
+}
+
+/// What became of the data of a hold.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Echoes that counted.
+    pub used: Vec<Used>,
+    /// Residuals of the edges in steps between shots, with lidar and side.
+    pub edges: Vec<(usize, usize, f64)>,
+    /// Echoes whose rays miss the blade.
+    pub missed: usize,
+    /// Echoes beyond the gate.
+    pub rejected: usize,
+    /// Echoes at grazing angles or ends of runs.
+    pub unfit: usize,
+    /// Edges that were soft, missed the blade, or lay beyond the gate.
+    pub edges_left_out: [usize; 3],
+}
+
+/// An echo that counted.
+#[derive(Debug, Clone, Copy)]
+pub struct Used {
+    /// Instant, nanoseconds.
+    pub time_ns: i64,
+    /// Number of the lidar.
+    pub lidar: usize,
+    /// Number of the beam.
+    pub ring: usize,
+    /// Arc length at which its ray meets the model, metres.
+    pub s_m: f64,
+    /// Measured minus modelled range, metres.
+    pub residual_m: f64,
+    /// Measured point, world, metres.
+    pub point: Vector3<f64>,
+}
+
+impl Weights {
+    /// Takes the noise of each lidar from the residuals: 1.48 of their median size.
+    pub fn learn(&mut self, tallies: &[Tally]) {
+        for lidar in 0..self.noise_m.len() {
+            let of = |t: &Tally| -> Vec<f64> {
+                t.used
+                    .iter()
+                    .filter(|u| u.lidar == lidar)
+                    .map(|u| u.residual_m.abs())
+                    .collect()
+            };
+            let mut sizes: Vec<f64> = tallies.iter().flat_map(of).collect();
+            if sizes.len() > 200 {
+                let middle = sizes.len() / 2;
+                let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
+                self.noise_m[lidar] = (1.4826 * *median).clamp(0.002, 0.1);
+            }
+        }
+    }
+}
+
+/// Makes the rows of one hold.
+pub struct Rows<'a> {
+    adjustment: &'a Adjustment,
+    lidars: &'a [Lidar],
+    gates: &'a Gates,
+    hold: usize,
+    posed: Posed,
+    state: Vec<usize>,
+    normal: Normal,
+    tally: Tally,
+}
+
+impl<'a> Rows<'a> {
+    /// For a hold as estimated so far.
+    pub fn new(
+        adjustment: &'a Adjustment,
+        hold: usize,
+        lidars: &'a [Lidar],
+        gates: &'a Gates,
+    ) -> Self {
+        Self {
+            lidars,
+            gates,
+            hold,
+            posed: adjustment.posed(hold),
+            state: adjustment.state_at(hold),
+            normal: Normal::new(adjustment.free.clone()),
+            tally: Tally::default(),
+            adjustment,
+        }
+    }
+
+    /// All rows, and what became of the data.
+    pub fn collect(mut self) -> (Normal, Tally) {
+        let seen = &self.adjustment.problem.holds[self.hold].seen;
+        let stride = seen
+            .echoes
+            .len()
+            .div_ceil(self.adjustment.weights.echoes)
+            .max(1);
+        let mut hint = None;
+        for echo in seen.echoes.iter().step_by(stride) {
+            hint = self.add_echo(echo, hint);
+        }
+        for edge in &seen.edges {
+            self.add_edge(edge);
+        }
+        (self.normal, self.tally)
+    }
+
+    /// Adds one echo; gives the arc length at which it met the blade, for the next one.
+    fn add_echo(&mut self, echo: &Echo, hint: Option<f64>) -> Option<f64> {
+        let lidar = &self.lidars[echo.lidar];
+        let direction = lidar.direction(&echo.direction);
+        let Some(hit) = self.hit(echo, lidar, &direction, hint) else {
+            self.tally.missed += 1;
+            return None;
+        };
+        let arc_m = Some(self.arc_m(&hit.contact));
+        if echo.from_end < MIXED_ECHOES || hit.cosine < FLATTEST_COSINE {
+            self.tally.unfit += 1;
+            return arc_m;
+        }
+        let mut row = self.echo_row(echo, &hit);
+        let built_m = self.built(&row);
+        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - built_m;
+        let weights = &self.adjustment.weights;
+        let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
+        let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
+        if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
+            self.tally.rejected += 1;
+            return arc_m;
+        }
+        self.tally.used.push(Used {
+            time_ns: echo.time_ns,
+            lidar: echo.lidar,
+            ring: echo.ring,
+            s_m: self.arc_m(&hit.contact),
+            residual_m: residual,
+            point: lidar.origin + direction * (hit.range_m + residual),
+        });
+        let weight = robust(residual, sigma, self.gates.echo_m) / (sigma * sigma);
+        self.normal.add(&mut row, residual, weight);
+        arc_m
+    }
+
+    fn hit(
+        &self,
+        echo: &Echo,
+        lidar: &Lidar,
+        direction: &Vector3<f64>,
+        hint: Option<f64>,
+    ) -> Option<Hit> {
+        let mesh = &self.adjustment.problem.mesh;
+        let blade = self.posed.at(echo.time_ns);
+        let near = hint.and_then(|s_m| blade.hit(mesh, &lidar.origin, direction, s_m));
+        near.or_else(|| {
+            let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
+            blade.hit(mesh, &lidar.origin, direction, s_m)
+        })
+    }
+
+    fn arc_m(&self, contact: &Contact) -> f64 {
+        let mesh = &self.adjustment.problem.mesh;
+        let section = &contact.section;
+        mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
+    }
+
+    /// What the surface as built adds to the prediction of the drawing, by a row's slopes.
+    fn built(&self, row: &[(usize, f64)]) -> f64 {
+        let (layout, values) = (&self.adjustment.layout, &self.adjustment.values);
+        let surface = layout.shape_at()..layout.edge_at();
+        let of_surface = row.iter().filter(|entry| surface.contains(&entry.0));
+        of_surface
+            .map(|(unknown, slope)| slope * values[*unknown])
+            .sum()
+    }
+
+    fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
+        let along = -hit.contact.normal / hit.cosine;
+        let mut row = self.row(&hit.contact, &along, echo.lidar, echo.time_ns);
+        let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
+        problem.shape.waves(
+            &problem.mesh,
+            &hit.contact,
+            &along,
+            layout.shape_at(),
+            &mut row,
+        );
+        let first = layout.lidar_at(echo.lidar);
+        row.push((first + 7, -hit.range_m));
+        if echo.ring < layout.channels[echo.lidar] {
+            row.push((first + RIG + echo.ring, -1.0));
+        }
+        row
+    }
+
+    /// How all unknowns but range errors move `along . displacement` of a contact against the lidar.
+    fn row(
+        &self,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        lidar: usize,
+        time_ns: i64,
+    ) -> Vec<(usize, f64)> {
+        let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
+        let about = (contact.point - contact.section.place).cross(along);
+        let slopes = self.posed.slopes(&contact.section, along, &about);
+        let mut row: Vec<(usize, f64)> = self.state.iter().copied().zip(slopes).collect();
+        let (knot, weights) = self.posed.beat(time_ns);
+        let sway = self.posed.sway_slopes(&contact.section, along, &about);
+        for (mode, slope) in sway.enumerate() {
+            let first = layout.sway_at(self.hold) + mode * layout.knots[self.hold] + knot;
+            let parts = weights.iter().enumerate();
+            row.extend(
+                parts
+                    .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
+            );
+        }
+        problem
+            .shape
+            .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
+        self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
+        row
+    }
+
+    fn add_edge(&mut self, edge: &Edge) {
+        let lidar = &self.lidars[edge.lidar];
+        let hit = lidar.direction(&edge.hit);
+        let miss = lidar.direction(&edge.miss);
+        let step_rad = hit.cross(&miss).norm().asin();
+        let plane = ScanPlane {
+            origin: lidar.origin,
+            ahead: hit,
+            aside: (miss - hit * hit.dot(&miss)).normalize(),
+        };
+        let mesh = &self.adjustment.problem.mesh;
+        let blade = self.posed.at(edge.time_ns);
+        let near = blade.nearest_s_m(mesh, &plane.origin, &hit);
+        let Some(silhouette) = blade.silhouette(mesh, &plane, near) else {
+            self.tally.edges_left_out[1] += 1;
+            return;
+        };
+        if silhouette.soft_m > SOFT_M {
+            self.tally.edges_left_out[0] += 1;
+            return;
+        }
+        self.add_silhouette(edge, &plane, &silhouette, step_rad);
+    }
+
+    fn add_silhouette(
+        &mut self,
+        edge: &Edge,
+        plane: &ScanPlane,
+        silhouette: &Silhouette,
+        step_rad: f64,
+    ) {
+        let layout = &self.adjustment.layout;
+        let side = side_of(silhouette.contact.x_c);
+        let at = layout.edge_offset_at(self.hold, edge.lidar, side);
+        let values = &self.adjustment.values;
+        let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
+        let mut row = self.edge_row(edge, plane, silhouette);
+        let built_rad = self.built(&row);
+        let residual = 0.5 * step_rad - silhouette.angle_rad - outside - built_rad;
+        let coarse_rad = self.gates.coarse_m()[1] / silhouette.range_m;
+        let sigma_rad = self.adjustment.weights.edge_rad.hypot(coarse_rad);
+        let sigma = (step_rad / 12f64.sqrt()).hypot(sigma_rad);
+        let gate_rad = (self.gates.edge_m / silhouette.range_m).max(4.0 * sigma);
+        let depth_m = (edge.range_m - silhouette.range_m).abs();
+        if residual.abs() > gate_rad || depth_m > self.gates.echo_m.max(0.5) {
+            self.tally.edges_left_out[2] += 1;
+            return;
+        }
+        self.tally
+            .edges
+            .push((edge.lidar, side, residual / step_rad));
+        row.push((layout.edge_at(), EDGE_RAD));
+        row.push((at, EDGE_OFFSET_RAD));
+        let weight = robust(residual, sigma, gate_rad) / (sigma * sigma);
+        self.normal.add(&mut row, residual, weight);
+    }
+
+    fn edge_row(
+        &self,
+        edge: &Edge,
+        plane: &ScanPlane,
+        silhouette: &Silhouette,
+    ) -> Vec<(usize, f64)> {
+        let to = silhouette.contact.point - plane.origin;
+        let range = to.norm();
+        let aside = (plane.aside - to * (plane.aside.dot(&to) / (range * range))).normalize();
+        let slope = silhouette.slope;
+        let normal = to.cross(&slope).normalize();
+        let along = normal / (normal.dot(&aside) * range);
+        self.row(&silhouette.contact, &along, edge.lidar, edge.time_ns)
+    }
+}
+
+/// 0 at the leading edge, 1 at the trailing edge.
+fn side_of(x_c: f64) -> usize {
+    usize::from(x_c > 0.5)
+}
+
+/// Weight of a residual: it fades beyond a few standard deviations, later while the gate is wide.
+fn robust(residual: f64, sigma: f64, gate: f64) -> f64 {
+    let width = (ROBUST * sigma).max(0.3 * gate);
+    1.0 / (1.0 + (residual / width).powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::adjust::Stage;
+    use super::super::sample;
+    use super::*;
+
+    const WIDE: Gates = Gates {
+        echo_m: 3.0,
+        edge_m: 3.0,
+        stage: Stage::All,
+    };
+
+    #[test]
+    fn slopes_of_all_unknowns_are_those_of_the_residuals() {
+        let adjustment = sample::adjustment(0.02);
+        let (normal, _) = adjustment.normal(&WIDE);
+        let step = 0.02;
+        let cost = |unknown: usize, change: f64| {
+            let mut moved = adjustment.clone();
+            moved.shift(unknown, change);
+            moved.normal(&WIDE).0.cost
+        };
+        let rig = adjustment.layout.lidar_at(0)..adjustment.layout.shape_at();
+        let scale = normal.right.amax();
+        for unknown in (0..adjustment.layout.len()).step_by(7) {
+            // Unknowns of the lidars have units of their own.
+            let step = if rig.contains(&unknown) { 1e-5 } else { step };
+            let slope = (cost(unknown, step) - cost(unknown, -step)) / (2.0 * step);
+            let expected = -2.0 * normal.right[unknown];
+            let close = (slope - expected).abs() < 0.03 * expected.abs() + 2e-3 * scale;
+            assert!(close, "unknown {unknown}: {slope} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn at_the_true_state_no_unknown_is_pulled_beyond_noise() {
+        let adjustment = sample::adjustment(0.0);
+        let (normal, tallies) = adjustment.normal(&WIDE);
+        assert!(tallies[0].used.len() > 1000 && tallies[0].edges.len() > 50);
+        for unknown in 0..adjustment.layout.len() {
+            let weight = normal.matrix[(unknown, unknown)];
+            let pull = normal.right[unknown] / weight.sqrt();
+            assert!(pull.abs() < 4.5, "unknown {unknown} is pulled by {pull}");
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Where the material sections of a hold are, how they are twisted, and how well that is known.
+
+use nalgebra::{DMatrix, Rotation3, Vector3};
+
+use super::adjust::{Adjustment, Gates};
+use super::mesh::Mesh;
+use super::posed::Posed;
+use super::sight::{Contact, Section};
+use crate::error::BeamError;
+
+/// Sections of all holds with one covariance.
+#[derive(Debug, Clone)]
+pub struct Sections {
+    /// By hold and section: x, y, z of the mid-chord point, metres, averaged over the hold, and the
+    /// twist change since the first hold, rad.
+    pub values: Vec<[f64; 4]>,
+    /// Joint covariance of all values in that order.
+    pub covariance: DMatrix<f64>,
+}
+
+/// One section of one state.
+pub(super) struct Place {
+    contact: Contact,
+    chord: Vector3<f64>,
+    point: Vector3<f64>,
+    sway: Vec<(usize, f64)>,
+}
+
+impl Adjustment {
+    /// The sections at `s_m` of all holds.
+    ///
+    /// # Errors
+    /// [`BeamError::Singular`].
+    pub fn sections(&self, s_m: &[f64], gates: &Gates) -> Result<Sections, BeamError> {
+        let posed: Vec<Posed> = (0..self.problem.holds.len())
+            .map(|hold| self.posed(hold))
+            .collect();
+        let count = posed.len() * s_m.len();
+        let mut values = Vec::with_capacity(count);
+        let mut rows = DMatrix::zeros(self.layout.len(), 4 * count);
+        for (hold, blade) in posed.iter().enumerate() {
+            for (i, s) in s_m.iter().enumerate() {
+                let first = 4 * (hold * s_m.len() + i);
+                let at = self.place_at(blade, hold, *s, None);
+                let rest = self.place_at(&posed[0], 0, *s, None);
+                values.push(self.fill_state(&mut rows, first, blade, hold, &at, &rest));
+                let (_, slopes) = twist(&self.problem.mesh, &rest, &at);
+                self.fill(
+                    &mut rows,
+                    first + 3,
+                    (&posed[0], 0),
+                    &rest,
+                    &Vector3::zeros(),
+                    &slopes[0],
+                );
+            }
+        }
+        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
+        let covariance = rows.tr_mul(&factor.solve(&rows));
+        Ok(Sections { values, covariance })
+    }
+
+    /// Position and twist of a section of a hold, with their slopes in four columns from `first`.
+    pub(super) fn fill_state(
+        &self,
+        rows: &mut DMatrix<f64>,
+        first: usize,
+        posed: &Posed,
+        hold: usize,
+        at: &Place,
+        rest: &Place,
+    ) -> [f64; 4] {
+        for axis in 0..3 {
+            let along = Vector3::ith(axis, 1.0);
+            self.fill(
+                rows,
+                first + axis,
+                (posed, hold),
+                at,
+                &along,
+                &Vector3::zeros(),
+            );
+        }
+        let (twist, slopes) = twist(&self.problem.mesh, rest, at);
+        self.fill(
+            rows,
+            first + 3,
+            (posed, hold),
+            at,
+            &Vector3::zeros(),
+            &slopes[1],
+        );
+        [at.point.x, at.point.y, at.point.z, twist]
+    }
+
+    /// A section of a hold at an instant, or averaged over the hold.
+    pub(super) fn place_at(
+        &self,
+        blade: &Posed,
+        hold: usize,
+        s_m: f64,
+        time_ns: Option<i64>,
+    ) -> Place {
+        let mesh = &self.problem.mesh;
+        let section = match time_ns {
+            None => blade.at_rest().section(mesh, s_m),
+            Some(time_ns) => blade.at(time_ns).section(mesh, s_m),
+        };
+        let blend = |column: &[Vector3<f64>]| {
+            column[section.node] * (1.0 - section.share) + column[section.node + 1] * section.share
+        };
+        let local = blend(&mesh.middle);
+        let contact = Contact {
+            local,
+            point: section.place + section.turn * local,
+            x_c: 0.5,
+            vertex: 0,
+            normal: Vector3::zeros(),
+            section,
+        };
+        let sway = match time_ns {
+            None => self.mean_sway(blade, hold),
+            Some(time_ns) => {
+                let (first, weights) = blade.beat(time_ns);
+                (0..4).map(|k| (first + k, weights[k])).collect()
+            }
+        };
+        let mut place = Place {
+            point: contact.point,
+            chord: section.turn * blend(&mesh.chord).normalize(),
+            contact,
+            sway,
+        };
+        place.point += self.correction((blade, hold), &place, time_ns.is_none());
+        place
+    }
+
+    /// Mean of the sway over a hold: its unknowns and their weights per metre at the tip.
+    fn mean_sway(&self, blade: &Posed, hold: usize) -> Vec<(usize, f64)> {
+        let span = self.problem.holds[hold].span_ns;
+        let instants = 200;
+        let mut weights = vec![0.0; blade.knots()];
+        for i in 0..instants {
+            let time_ns = span.0 + (span.1 - span.0) * (2 * i + 1) / (2 * instants);
+            let (first, parts) = blade.beat(time_ns);
+            (0..4).for_each(|k| weights[first + k] += parts[k] / instants as f64);
+        }
+        weights.into_iter().enumerate().collect()
+    }
+
+    /// What the surface unknowns add to the point of the drawing, and the sway where it is not in it.
+    fn correction(&self, of: (&Posed, usize), place: &Place, has_sway: bool) -> Vector3<f64> {
+        let mut rows = DMatrix::zeros(self.layout.len(), 3);
+        for axis in 0..3 {
+            let along = Vector3::ith(axis, 1.0);
+            self.fill(&mut rows, axis, of, place, &along, &Vector3::zeros());
+        }
+        let mut values = self.values.clone();
+        let posed = if has_sway {
+            self.layout.sway_at(0)
+        } else {
+            self.layout.lidar_at(0)
+        };
+        values.rows_mut(0, posed).fill(0.0);
+        Vector3::from_iterator(rows.tr_mul(&values).iter().copied())
+    }
+
+    /// Adds to a column how all unknowns move a place along `along` and turn it about `turn`.
+    fn fill(
+        &self,
+        rows: &mut DMatrix<f64>,
+        column: usize,
+        (posed, hold): (&Posed, usize),
+        place: &Place,
+        along: &Vector3<f64>,
+        turn: &Vector3<f64>,
+    ) {
+        let (layout, section) = (&self.layout, &place.contact.section);
+        let about = (place.contact.point - section.place).cross(along) + turn;
+        let slopes = posed.slopes(section, along, &about);
+        for (unknown, slope) in self.state_at(hold).into_iter().zip(slopes) {
+            rows[(unknown, column)] += slope;
+        }
+        for (mode, slope) in posed.sway_slopes(section, along, &about).enumerate() {
+            let first = layout.sway_at(hold) + mode * layout.knots[hold];
+            for (knot, weight) in &place.sway {
+                rows[(first + knot, column)] += slope * weight * self.modes_m[mode];
+            }
+        }
+        let mut shape = Vec::new();
+        let problem = &self.problem;
+        problem.shape.slopes(
+            &problem.mesh,
+            &place.contact,
+            along,
+            layout.shape_at(),
+            &mut shape,
+        );
+        for (unknown, slope) in shape {
+            rows[(unknown, column)] += slope;
+        }
+    }
+}
+
+/// Twist change from one state to another, positive as in the drawing, and its slopes by rotations of
+/// both sections about the world axes.
+fn twist(mesh: &Mesh, rest: &Place, now: &Place) -> (f64, [Vector3<f64>; 2]) {
+    let of = |rest_turn: &Vector3<f64>, turn: &Vector3<f64>| {
+        let (a, b) = (
+            Rotation3::from_scaled_axis(*rest_turn),
+            Rotation3::from_scaled_axis(*turn),
+        );
+        mesh.hand
+            * twist_rad(
+                &(a * tangent(&rest.contact.section)),
+                &(a * rest.chord),
+                &(b * tangent(&now.contact.section)),
+                &(b * now.chord),
+            )
+    };
+    let zero = Vector3::zeros();
+    let step = 1e-5;
+    let slope = |of: &dyn Fn(&Vector3<f64>) -> f64| {
+        Vector3::from_fn(|axis, _| {
+            let turn = Vector3::ith(axis, step);
+            (of(&turn) - of(&-turn)) / (2.0 * step)
+        })
+    };
+    let slopes = [
+        slope(&|turn| of(turn, &zero)),
+        slope(&|turn| of(&zero, turn)),
+    ];
+    (of(&zero, &zero), slopes)
+}
+
+fn tangent(section: &Section) -> Vector3<f64> {
+    section.turn.column(2).normalize()
+}
+
+/// Angle about the tangent from the chord at rest, carried by the smallest rotation between both
+/// tangents, to the chord now.
+pub fn twist_rad(
+    rest_tangent: &Vector3<f64>,
+    rest_chord: &Vector3<f64>,
+    tangent: &Vector3<f64>,
+    chord: &Vector3<f64>,
+) -> f64 {
+    let smallest = Rotation3::rotation_between(rest_tangent, tangent).unwrap_or_default();
+    let carried = smallest * rest_chord;
+    carried.cross(chord).dot(tangent).atan2(carried.dot(chord))
+}

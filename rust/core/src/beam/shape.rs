@@ -1,0 +1,159 @@
+//! The surface as built: chord, setting angle and waves against the drawing.
+
+use std::f64::consts::PI;
+
+use super::mesh::Mesh;
+use super::sight::Contact;
+use super::table;
+use nalgebra::Vector3;
+
+/// How well the surface is known beforehand, standard deviations.
+#[derive(Debug, Clone, Copy)]
+pub struct ShapeTrust {
+    /// Of the chord as a whole, relative.
+    pub chord: f64,
+    /// Of the chord as it varies along the span, relative.
+    pub chord_waves: f64,
+    /// Of the setting angle, rad.
+    pub setting_rad: f64,
+    /// Of the twist as it varies along the span, rad.
+    pub twist_waves_rad: f64,
+    /// Of the axis within the chord, chord lengths.
+    pub axis_fraction: f64,
+    /// Of each wave of the surface, metres.
+    pub waves_m: f64,
+}
+
+impl Default for ShapeTrust {
+    /// A blade built after a drawing.
+    fn default() -> Self {
+        Self {
+            chord: 0.004,
+            chord_waves: 0.001,
+            setting_rad: 0.3f64.to_radians(),
+            twist_waves_rad: 0.0005,
+            axis_fraction: 0.002,
+            waves_m: 0.002,
+        }
+    }
+}
+
+/// Waves over the chord of each side.
+const CHORD_WAVES: usize = 4;
+/// Distance between the knots of the waves, metres.
+const KNOT_M: f64 = 3.0;
+/// Distance between the knots of chord and twist, metres.
+const SLOW_KNOT_M: f64 = 9.0;
+
+/// Unknowns of the surface, in standard deviations.
+#[derive(Debug, Clone)]
+pub struct Shape {
+    trust: ShapeTrust,
+    from_m: f64,
+    slow: usize,
+    knots: usize,
+}
+
+impl Shape {
+    /// Of the blade outboard of `from_m`; inboard of it nothing is seen.
+    pub fn new(mesh: &Mesh, trust: ShapeTrust, from_m: f64) -> Self {
+        let length = (mesh.length_m() - from_m).max(KNOT_M);
+        Self {
+            trust,
+            from_m,
+            slow: (length / SLOW_KNOT_M).ceil() as usize + 1,
+            knots: (length / KNOT_M).ceil() as usize + 1,
+        }
+    }
+
+    /// Number of unknowns: chord, setting, axis, chord and twist by slow knots, waves.
+    pub fn len(&self) -> usize {
+        3 + 2 * self.slow + 2 * CHORD_WAVES * self.knots
+    }
+
+    /// Whether there is none: never.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// How far each unknown moves a point of the surface along `along` (world, any length), appended
+    /// with its number from `first`.
+    pub fn slopes(
+        &self,
+        mesh: &Mesh,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        first: usize,
+        out: &mut Vec<(usize, f64)>,
+    ) {
+        let local = contact.section.turn.tr_mul(along);
+        let swell = local.dot(&contact.local);
+        let twist = mesh.hand * (local.y * contact.local.x - local.x * contact.local.y);
+        let chord = mesh.chord[contact.section.node] * mesh.chord_m[contact.section.node];
+        out.push((first, self.trust.chord * swell));
+        out.push((first + 1, self.trust.setting_rad * twist));
+        out.push((first + 2, -self.trust.axis_fraction * local.dot(&chord)));
+        let s_m = self.arc_m(mesh, contact);
+        for (knot, weight) in hats(s_m - self.from_m, SLOW_KNOT_M, self.slow) {
+            out.push((first + 3 + knot, self.trust.chord_waves * weight * swell));
+            out.push((
+                first + 3 + self.slow + knot,
+                self.trust.twist_waves_rad * weight * twist,
+            ));
+        }
+    }
+
+    /// The same for the waves, which stand out along the normal.
+    pub fn waves(
+        &self,
+        mesh: &Mesh,
+        contact: &Contact,
+        along: &Vector3<f64>,
+        first: usize,
+        out: &mut Vec<(usize, f64)>,
+    ) {
+        let outward = self.trust.waves_m * along.dot(&contact.normal);
+        let side = usize::from(contact.vertex >= mesh.outline[0].len() / 2);
+        let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;
+        for (knot, weight) in hats(self.arc_m(mesh, contact) - self.from_m, KNOT_M, self.knots) {
+            for wave in 0..CHORD_WAVES {
+                let height = (PI * wave as f64 * contact.x_c).cos();
+                out.push((first + knot * CHORD_WAVES + wave, outward * weight * height));
+            }
+        }
+    }
+
+    fn arc_m(&self, mesh: &Mesh, contact: &Contact) -> f64 {
+        let section = &contact.section;
+        mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
+    }
+}
+
+/// Two hat functions that are not zero at `x`, and their values; constant beyond the ends.
+fn hats(x: f64, knot_m: f64, count: usize) -> [(usize, f64); 2] {
+    let knots = count.max(2) - 1;
+    let place = (x / knot_m).clamp(0.0, knots as f64);
+    let first = (place.floor() as usize).min(knots - 1);
+    let share = place - first as f64;
+    [(first, 1.0 - share), (first + 1, share)]
+}
+
+/// Cubic B-splines with even knots: the four that are not zero, and their values.
+pub fn splines(x: f64, count: usize) -> (usize, [f64; 4]) {
+    let place = x.clamp(0.0, (count - 3) as f64);
+    let first = (place.floor() as usize).min(count - 4);
+    let t = place - first as f64;
+    let r = 1.0 - t;
+    let values = [
+        r * r * r / 6.0,
+        (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,
+        (3.0 * r * r * r - 6.0 * r * r + 4.0) / 6.0,
+        t * t * t / 6.0,
+    ];
+    (first, values)
+}
+
+/// A value of a table at a contact's arc length.
+pub fn at_arc(mesh: &Mesh, values: &[f64], s_m: f64) -> f64 {
+    table::linear(&mesh.s_m, values, s_m)
+}

@@ -1,0 +1,401 @@
+//! A ray or a scan plane against the blade: where it meets the surface, where it passes the edge.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::axis::Axis;
+use super::mesh::Mesh;
+use super::table;
+
+/// Improvements of the arc length at which a ray meets the blade.
+const STEPS: usize = 6;
+/// The hit lies in the plane of its section to this, metres.
+const CONVERGED_M: f64 = 1e-5;
+
+/// Two states between which the blade is, and the share of the way.
+#[derive(Debug, Clone, Copy)]
+pub struct Instant<'a> {
+    /// State before.
+    pub before: &'a Axis,
+    /// State after.
+    pub after: &'a Axis,
+    /// Share of the way between both.
+    pub share: f64,
+}
+
+/// A section at one instant.
+#[derive(Debug, Clone, Copy)]
+pub struct Section {
+    /// Inner node of its element.
+    pub node: usize,
+    /// Place within the element.
+    pub share: f64,
+    /// World place of the axis, metres.
+    pub place: Vector3<f64>,
+    /// World directions of the section.
+    pub turn: Matrix3<f64>,
+    /// Curvature in the section's directions, rad/m.
+    pub curvature: Vector3<f64>,
+}
+
+/// Where something meets the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Contact {
+    /// The section.
+    pub section: Section,
+    /// Point from the axis in the section's directions, metres.
+    pub local: Vector3<f64>,
+    /// World point, metres.
+    pub point: Vector3<f64>,
+    /// Place along the chord, and whether on the second half of the outline.
+    pub x_c: f64,
+    /// Index of the outline's point at or before the contact.
+    pub vertex: usize,
+    /// Outward normal, world, unit length.
+    pub normal: Vector3<f64>,
+}
+
+/// A ray that meets the surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Hit {
+    /// Where.
+    pub contact: Contact,
+    /// Distance along the ray, metres.
+    pub range_m: f64,
+    /// Cosine of the angle of incidence.
+    pub cosine: f64,
+}
+
+/// The silhouette of the blade in a scan plane, on one side.
+#[derive(Debug, Clone, Copy)]
+pub struct Silhouette {
+    /// Its point.
+    pub contact: Contact,
+    /// Angle from the plane's first direction, rad.
+    pub angle_rad: f64,
+    /// Distance from the origin of the scan plane, metres.
+    pub range_m: f64,
+    /// Width of the strip beside it that is seen at a grazing angle, metres across the view.
+    pub soft_m: f64,
+    /// World direction of the silhouette along the span, per metre of arc length.
+    pub slope: Vector3<f64>,
+}
+
+/// A plane that a scan line sweeps.
+#[derive(Debug, Clone, Copy)]
+pub struct ScanPlane {
+    /// Optical centre, world, metres.
+    pub origin: Vector3<f64>,
+    /// Direction of angle zero.
+    pub ahead: Vector3<f64>,
+    /// Direction of a quarter turn, away from the blade.
+    pub aside: Vector3<f64>,
+}
+
+/// Facets seen at a flatter angle than this lose their echoes, cosine of incidence.
+const GRAZING_COSINE: f64 = 0.17;
+
+impl Instant<'_> {
+    /// The section at an arc length.
+    pub fn section(&self, mesh: &Mesh, s_m: f64) -> Section {
+        let (node, share) = table::interval(&mesh.s_m, s_m);
+        let (inner, outer) = (self.turn(node), self.turn(node + 1));
+        let (from, to) = (self.place(node), self.place(node + 1));
+        // An element is an arc: it stands out beyond its chord.
+        let bow = (outer - inner).column(2) * (0.5 * mesh.step_m(node) * share * (share - 1.0));
+        Section {
+            node,
+            share,
+            place: from + (to - from) * share + bow,
+            turn: inner + (outer - inner) * share,
+            curvature: self.before.curvature[node] * (1.0 - self.share)
+                + self.after.curvature[node] * self.share,
+        }
+    }
+
+    fn turn(&self, node: usize) -> Matrix3<f64> {
+        let (a, b) = (&self.before.turn[node], &self.after.turn[node]);
+        a + (b - a) * self.share
+    }
+
+    fn place(&self, node: usize) -> Vector3<f64> {
+        let (a, b) = (&self.before.place[node], &self.after.place[node]);
+        a + (b - a) * self.share
+    }
+
+    /// Arc length at which the blade passes nearest to a ray, by its nodes.
+    pub fn nearest_s_m(&self, mesh: &Mesh, origin: &Vector3<f64>, direction: &Vector3<f64>) -> f64 {
+        let distance = |node: &usize| {
+            let to = self.place(*node) - origin;
+            (to - direction * to.dot(direction)).norm_squared()
+        };
+        let stride = 4;
+        let coarse = (0..mesh.len())
+            .step_by(stride)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let middle = coarse.unwrap_or(0);
+        let near = middle.saturating_sub(stride)..(middle + stride).min(mesh.len());
+        let node = near.min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        mesh.s_m[node.unwrap_or(middle)]
+    }
+
+    /// Where a ray meets the surface first, searched from arc length `start_m`.
+    pub fn hit(
+        &self,
+        mesh: &Mesh,
+        origin: &Vector3<f64>,
+        direction: &Vector3<f64>,
+        start_m: f64,
+    ) -> Option<Hit> {
+        let mut s_m = start_m;
+        for _ in 0..STEPS {
+            let section = self.section(mesh, s_m);
+            let from = section.turn.tr_mul(&(origin - section.place));
+            let way = section.turn.tr_mul(direction);
+            let (edge, along, range_m) = cross(mesh, &section, &from, &way)?;
+            let ahead_m = from.z + way.z * range_m;
+            if ahead_m.abs() < CONVERGED_M {
+                let contact = contact(mesh, section, edge, along);
+                let cosine = -contact.normal.dot(direction);
+                return (cosine > 0.0).then_some(Hit {
+                    contact,
+                    range_m,
+                    cosine,
+                });
+            }
+            s_m += ahead_m;
+            if !(0.0..=mesh.length_m()).contains(&s_m) {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// The outermost point of the blade in a scan plane, searched from arc length `start_m`.
+    pub fn silhouette(&self, mesh: &Mesh, plane: &ScanPlane, start_m: f64) -> Option<Silhouette> {
+        let across = plane.ahead.cross(&plane.aside);
+        let mut s_m = start_m;
+        for _ in 0..STEPS {
+            let section = self.section(mesh, s_m);
+            let off = across.dot(&(section.place - plane.origin));
+            s_m -= off / across.dot(&section.turn.column(2));
+        }
+        if !(0.0..=mesh.length_m()).contains(&s_m) {
+            return None;
+        }
+        let count = mesh.outline[0].len();
+        let view = |vertex: usize, s_m: f64| self.seen(mesh, plane, &across, vertex, s_m);
+        let views: Vec<View> = (0..count).map(|vertex| view(vertex, s_m)).collect();
+        let outermost = (0..count).max_by(|a, b| views[*a].angle.total_cmp(&views[*b].angle))?;
+        let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
+        let refined = near.map(|vertex| {
+            (
+                vertex,
+                self.refine(mesh, plane, &across, vertex, views[vertex].s_m),
+            )
+        });
+        let best = refined
+            .iter()
+            .max_by(|a, b| a.1.angle.total_cmp(&b.1.angle))?;
+        if !(0.0..=mesh.length_m()).contains(&best.1.s_m) {
+            return None;
+        }
+        let section = self.section(mesh, best.1.s_m);
+        let contact = contact(mesh, section, best.0, 0.0);
+        Some(Silhouette {
+            contact,
+            angle_rad: best.1.angle,
+            range_m: (contact.point - plane.origin).norm(),
+            soft_m: softness_m(&views, best.0),
+            slope: section.turn * span_slope(mesh, &section, best.0, 0.0, &contact.local),
+        })
+    }
+
+    fn refine(
+        &self,
+        mesh: &Mesh,
+        plane: &ScanPlane,
+        across: &Vector3<f64>,
+        vertex: usize,
+        s_m: f64,
+    ) -> View {
+        let once = self.seen(mesh, plane, across, vertex, s_m);
+        self.seen(mesh, plane, across, vertex, once.s_m)
+    }
+
+    /// Where a point of the outline passes through a scan plane, by its slope at `s_m`.
+    fn seen(
+        &self,
+        mesh: &Mesh,
+        plane: &ScanPlane,
+        across: &Vector3<f64>,
+        vertex: usize,
+        s_m: f64,
+    ) -> View {
+        let section = self.section(mesh, s_m);
+        let contact = contact(mesh, section, vertex, 0.0);
+        let slope = section.turn * span_slope(mesh, &section, vertex, 0.0, &contact.local);
+        let step = -across.dot(&(contact.point - plane.origin)) / across.dot(&slope);
+        let to = contact.point + slope * step - plane.origin;
+        let (ahead_m, aside_m) = (to.dot(&plane.ahead), to.dot(&plane.aside));
+        View {
+            angle: aside_m.atan2(ahead_m),
+            s_m: s_m + step,
+            ahead_m,
+            aside_m,
+        }
+    }
+}
+
+/// A point of the outline as a scan plane sees it.
+#[derive(Debug, Clone, Copy)]
+struct View {
+    angle: f64,
+    s_m: f64,
+    ahead_m: f64,
+    aside_m: f64,
+}
+
+/// Width across the view of the facets beside the silhouette that are seen at a grazing angle.
+fn softness_m(views: &[View], outermost: usize) -> f64 {
+    let count = views.len();
+    let step = if is_seen_ahead(views, outermost) {
+        1
+    } else {
+        count - 1
+    };
+    let mut width_m = 0.0;
+    let mut a = outermost;
+    for _ in 0..count / 2 {
+        let b = (a + step) % count;
+        let deep = views[a].ahead_m - views[b].ahead_m;
+        let wide = views[a].aside_m - views[b].aside_m;
+        if wide < 0.0 || wide > GRAZING_COSINE * deep.hypot(wide) {
+            break;
+        }
+        width_m += wide;
+        a = b;
+    }
+    width_m
+}
+
+/// Whether the side of the outline after its outermost point is the one that faces the sensor: the
+/// nearer one of the two where both are a little farther in.
+fn is_seen_ahead(views: &[View], outermost: usize) -> bool {
+    const INWARD_M: f64 = 0.02;
+    let count = views.len();
+    let depth = |step: usize| {
+        let mut at = outermost;
+        for _ in 0..count / 2 {
+            at = (at + step) % count;
+            if views[at].aside_m < views[outermost].aside_m - INWARD_M {
+                break;
+            }
+        }
+        views[at].ahead_m
+    };
+    depth(1) < depth(count - 1)
+}
+
+/// First facet of the outline that a line in the section's plane enters: its first point, the place
+/// on it, and the distance along the line.
+fn cross(
+    mesh: &Mesh,
+    section: &Section,
+    from: &Vector3<f64>,
+    way: &Vector3<f64>,
+) -> Option<(usize, f64, f64)> {
+    let (inner, outer) = (&mesh.outline[section.node], &mesh.outline[section.node + 1]);
+    let at = |i: usize| {
+        let (a, b) = (inner[i], outer[i]);
+        (
+            a[0] + (b[0] - a[0]) * section.share - from.x,
+            a[1] + (b[1] - a[1]) * section.share - from.y,
+        )
+    };
+    let side = |p: (f64, f64)| way.x * p.1 - way.y * p.0;
+    let count = inner.len();
+    let mut best: Option<(usize, f64, f64)> = None;
+    let mut last = at(count - 1);
+    let mut last_side = side(last);
+    for i in 0..count {
+        let point = at(i);
+        let this_side = side(point);
+        if (last_side > 0.0) != (this_side > 0.0) {
+            let along = last_side / (last_side - this_side);
+            let x = last.0 + (point.0 - last.0) * along;
+            let y = last.1 + (point.1 - last.1) * along;
+            let range = (x * way.x + y * way.y) / (way.x * way.x + way.y * way.y);
+            if range > 0.0 && best.is_none_or(|b| range < b.2) {
+                best = Some(((i + count - 1) % count, along, range));
+            }
+        }
+        (last, last_side) = (point, this_side);
+    }
+    best
+}
+
+/// Point of the outline at a vertex and a share of the way to the next one.
+fn outline_at(mesh: &Mesh, node: usize, vertex: usize, along: f64) -> [f64; 2] {
+    let outline = &mesh.outline[node];
+    let (a, b) = (outline[vertex], outline[(vertex + 1) % outline.len()]);
+    [a[0] + (b[0] - a[0]) * along, a[1] + (b[1] - a[1]) * along]
+}
+
+fn contact(mesh: &Mesh, section: Section, vertex: usize, along: f64) -> Contact {
+    let inner = outline_at(mesh, section.node, vertex, along);
+    let outer = outline_at(mesh, section.node + 1, vertex, along);
+    let blend = |k: usize| inner[k] + (outer[k] - inner[k]) * section.share;
+    let local = Vector3::new(blend(0), blend(1), 0.0);
+    let count = mesh.outline[0].len();
+    let (x, next) = (&mesh.x_c[section.node], (vertex + 1) % count);
+    let normal = outward(mesh, &section, vertex, along, &local);
+    Contact {
+        section,
+        local,
+        point: section.place + section.turn * local,
+        x_c: x[vertex] + (x[next] - x[vertex]) * along,
+        vertex,
+        normal: section.turn * normal,
+    }
+}
+
+/// How a point of the surface moves along the span, in the section's directions.
+fn span_slope(
+    mesh: &Mesh,
+    section: &Section,
+    vertex: usize,
+    along: f64,
+    local: &Vector3<f64>,
+) -> Vector3<f64> {
+    let inner = outline_at(mesh, section.node, vertex, along);
+    let outer = outline_at(mesh, section.node + 1, vertex, along);
+    let length = mesh.step_m(section.node);
+    let taper = Vector3::new(
+        (outer[0] - inner[0]) / length,
+        (outer[1] - inner[1]) / length,
+        1.0,
+    );
+    taper + section.curvature.cross(local)
+}
+
+fn outward(
+    mesh: &Mesh,
+    section: &Section,
+    vertex: usize,
+    along: f64,
+    local: &Vector3<f64>,
+) -> Vector3<f64> {
+    let count = mesh.outline[0].len();
+    let end = |i: usize| {
+        let (a, b) = (
+            mesh.outline[section.node][i],
+            mesh.outline[section.node + 1][i],
+        );
+        [0, 1].map(|k| a[k] + (b[k] - a[k]) * section.share)
+    };
+    let (a, b) = (end(vertex), end((vertex + 1) % count));
+    let facet = Vector3::new(b[0] - a[0], b[1] - a[1], 0.0);
+    let slope = span_slope(mesh, section, vertex, along, local);
+    // The outline runs round the section in the sense that the hand of the blade gives it.
+    (slope.cross(&facet) * mesh.hand).normalize()
+}

@@ -1,0 +1,585 @@
+//! The models: what they differ in, how packets become returns.
+//!
+//! Length and first bytes tell the model, and a type byte where it is known; but for an M1 Plus, which
+//! sends what an M1 sends.
+
+use super::blocks::{Block, Blocks, Point};
+use super::columns::Columns;
+use super::description::{self, Angles};
+use super::header;
+use crate::cloud::{Return, ReturnKind};
+use crate::error::UnitError;
+use crate::loss::cycle::Restarts;
+use crate::packet::aim::{Centidegrees, bear, wrapped};
+use crate::packet::echoes::{RawEcho, judge};
+use crate::packet::frames::place_rad;
+use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
+use crate::packet::{
+    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
+};
+
+/// Metres of one unit of range.
+const UNIT_M: f64 = 0.005;
+/// Time of a frame at the rate that sensors are delivered with.
+const FRAME_NS: i64 = 100_000_000;
+/// Types that are known.
+const KINDS: [u8; 4] = [0x10, 0x42, 0x62, 0x70];
+/// How to get the pitch of the rows.
+const OBTAIN: &str = "record the packets that describe the unit as well (DIFOP2, port 7766, every two seconds), or give a \
+    capture that has one: --beams ADDRESS=FILE";
+
+/// What a packet holds.
+#[derive(Debug, Clone, Copy)]
+pub enum Body {
+    /// Blocks of points that tell where they are.
+    Blocks(Blocks),
+    /// A column or a part of one.
+    Columns(Columns),
+}
+
+/// A model.
+#[derive(Debug, Clone, Copy)]
+pub struct Solid {
+    id: &'static str,
+    title: &'static str,
+    candidates: &'static [&'static str],
+    /// Type byte, where it is known.
+    kind: Option<u8>,
+    /// What its packets hold.
+    pub body: Body,
+    /// Smallest and largest range that is one, in units: the maker's limits.
+    limits: (u16, u16),
+    /// Number of the first packet of a frame.
+    first: u32,
+    /// Packets of a frame with one and with two returns.
+    frame: (i64, i64),
+    /// The two returns of a shot.
+    dual: ReturnMode,
+    is_told: bool,
+}
+
+const fn blocks(
+    len: usize,
+    count: usize,
+    block_len: usize,
+    time_len: usize,
+    has_return: bool,
+    points: usize,
+    point: Point,
+) -> Body {
+    let point_len = match point {
+        Point::Angles => 9,
+        Point::Vector => 10,
+        Point::Pair => 13,
+    };
+    Body::Blocks(Blocks {
+        len,
+        count,
+        block_len,
+        time_len,
+        has_return,
+        points,
+        point,
+        point_len,
+    })
+}
+
+/// M1.
+pub static M1: Solid = Solid {
+    id: "rs-m1",
+    title: "RoboSense M1",
+    candidates: &["rs-m1-plus"],
+    kind: Some(0x10),
+    body: blocks(1210, 25, 47, 1, true, 5, Point::Angles),
+    limits: (40, 40_000),
+    first: 1,
+    frame: (630, 1260),
+    dual: ReturnMode::Dual,
+    is_told: true,
+};
+/// M1 Plus, when it is named.
+pub static M1_PLUS: Solid = Solid {
+    id: "rs-m1-plus",
+    title: "RoboSense M1 Plus",
+    candidates: &["rs-m1"],
+    is_told: false,
+    ..M1
+};
+/// M2.
+pub static M2: Solid = Solid {
+    id: "rs-m2",
+    title: "RoboSense M2",
+    candidates: &[],
+    kind: None,
+    body: blocks(1342, 25, 52, 1, true, 5, Point::Vector),
+    limits: (40, 50_000),
+    frame: (1260, 2520),
+    ..M1
+};
+/// M3.
+pub static M3: Solid = Solid {
+    id: "rs-m3",
+    title: "RoboSense M3",
+    body: blocks(1448, 5, 282, 2, false, 28, Point::Vector),
+    limits: (20, 60_000),
+    frame: (2270, 4540),
+    ..M2
+};
+/// MX.
+pub static MX: Solid = Solid {
+    id: "rs-mx",
+    title: "RoboSense MX",
+    body: blocks(1404, 50, 27, 1, false, 2, Point::Pair),
+    limits: (40, 40_000),
+    frame: (630, 630),
+    ..M2
+};
+/// E1.
+pub static E1: Solid = Solid {
+    id: "rs-e1",
+    title: "RoboSense E1",
+    kind: Some(0x62),
+    body: blocks(1200, 96, 12, 2, false, 1, Point::Vector),
+    limits: (1, 40_000),
+    first: 0,
+    frame: (288, 576),
+    ..M2
+};
+/// EMX.
+pub static EMX: Solid = Solid {
+    id: "rs-emx",
+    title: "RoboSense EMX",
+    kind: Some(0x42),
+    body: Body::Columns(Columns::Emx),
+    limits: (40, 60_000),
+    frame: (1520, 3040),
+    dual: ReturnMode::FirstLast,
+    ..M2
+};
+/// EM4.
+pub static EM4: Solid = Solid {
+    id: "rs-em4",
+    title: "RoboSense EM4",
+    kind: Some(0x70),
+    body: Body::Columns(Columns::Em4),
+    limits: (1, u16::MAX),
+    frame: (2400, 4800),
+    dual: ReturnMode::FirstSecond,
+    ..M2
+};
+
+impl Solid {
+    fn len(&self) -> usize {
+        match self.body {
+            Body::Blocks(blocks) => blocks.len,
+            Body::Columns(columns) => columns.len(),
+        }
+    }
+
+    /// Type byte of its packets.
+    pub fn kind(&self) -> u8 {
+        self.kind.unwrap_or(0)
+    }
+
+    /// Packets of a frame as the maker states them.
+    pub fn packets(&self, mode: ReturnMode) -> i64 {
+        if mode.returns() == 1 {
+            self.frame.0
+        } else {
+            self.frame.1
+        }
+    }
+
+    /// Number of the first packet of a frame.
+    pub fn first_number(&self) -> u32 {
+        self.first
+    }
+
+    /// Return mode that stands for two returns.
+    pub fn dual(&self) -> ReturnMode {
+        self.dual
+    }
+
+    fn is_packet(&self, payload: &[u8]) -> bool {
+        let is_sound = match self.body {
+            Body::Blocks(_) => true,
+            Body::Columns(columns) => columns.is_sound(payload),
+        };
+        is_sound && header::is_packet(payload, self.len())
+    }
+
+    fn mode(&self, payload: &[u8]) -> ReturnMode {
+        header::return_mode(payload, self.dual)
+    }
+
+    /// Returns of a shot that stand side by side in a packet.
+    fn returns(&self, payload: &[u8]) -> usize {
+        match self.body {
+            Body::Blocks(blocks) if blocks.point != Point::Pair => 1,
+            _ => self.mode(payload).returns(),
+        }
+    }
+
+    /// Packets of a frame and its time.
+    fn frame(&self, payload: &[u8]) -> (i64, i64) {
+        let mode = self.mode(payload);
+        match self.body {
+            Body::Blocks(_) => (self.packets(mode), FRAME_NS),
+            Body::Columns(columns) => {
+                let len = columns.frame_len(payload, mode.returns());
+                (len, columns.frame_ns(payload))
+            }
+        }
+    }
+
+    fn cut(&self, (range, intensity): (u16, u8)) -> RawEcho {
+        let (least, most) = self.limits;
+        RawEcho {
+            range: if (least..=most).contains(&range) {
+                range
+            } else {
+                0
+            },
+            intensity,
+        }
+    }
+
+    fn device_ns(&self, payload: &[u8]) -> i64 {
+        let lead_ns = match self.body {
+            Body::Blocks(_) => 0,
+            Body::Columns(columns) => columns.lead_ns(payload),
+        };
+        header::time_ns(payload).saturating_sub(lead_ns)
+    }
+
+    /// Visits the echoes of shots whose returns do not stand side by side.
+    fn singles(&self, blocks: Blocks, payload: &[u8], mut take: impl FnMut(Shot<'_>, RawEcho)) {
+        for (number, block) in blocks.blocks(payload).enumerate() {
+            for (channel, point) in block.points().enumerate() {
+                let echo = self.cut(blocks.point.echoes(point)[0]);
+                if echo.range != 0 {
+                    let shot = Shot {
+                        number,
+                        block,
+                        channel,
+                        point,
+                    };
+                    take(shot, echo);
+                }
+            }
+        }
+    }
+
+    /// Visits the shots of two returns side by side.
+    fn pairs(&self, blocks: Blocks, payload: &[u8], mut take: impl FnMut(Shot<'_>, [RawEcho; 2])) {
+        for (number, block) in blocks.blocks(payload).enumerate() {
+            for (channel, point) in block.points().enumerate() {
+                let echoes = blocks.point.echoes(point).map(|echo| self.cut(echo));
+                let shot = Shot {
+                    number,
+                    block,
+                    channel,
+                    point,
+                };
+                take(shot, echoes);
+            }
+        }
+    }
+}
+
+/// A shot of a block.
+struct Shot<'a> {
+    number: usize,
+    block: Block<'a>,
+    channel: usize,
+    point: &'a [u8],
+}
+
+/// Meaning of a single return.
+fn single_kind(mode: ReturnMode, index: u8) -> ReturnKind {
+    match (mode, index) {
+        (ReturnMode::Last, _) => ReturnKind::Last,
+        (ReturnMode::First, _) => ReturnKind::First,
+        // Of two returns in packets of their own the second is the last.
+        (ReturnMode::Dual, 1) => ReturnKind::Last,
+        _ => ReturnKind::Strongest,
+    }
+}
+
+impl Model for Solid {
+    fn id(&self) -> &'static str {
+        self.id
+    }
+
+    fn title(&self) -> &'static str {
+        self.title
+    }
+
+    fn candidates(&self) -> &'static [&'static str] {
+        self.candidates
+    }
+
+    fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
+        if let Some(kind) = description::kind(payload) {
+            return Some(kind);
+        }
+        let kind = header::kind(payload);
+        let is_others = self.kind != Some(kind) && KINDS.contains(&kind);
+        let is_own = self.is_told && !is_others && self.is_packet(payload);
+        is_own.then_some(PacketKind::Data)
+    }
+
+    fn fits(&self, payload: &[u8]) -> bool {
+        self.is_packet(payload)
+    }
+
+    fn misfit(&self, payload: &[u8]) -> Misfit {
+        let kind = header::kind(payload);
+        Misfit {
+            why: format!(
+                "{} bytes of type {kind:#04x} are not those of {}",
+                payload.len(),
+                self.title
+            ),
+            may_be: Some(self.id),
+        }
+    }
+
+    fn head(&self, payload: &[u8]) -> Option<Head> {
+        if !self.is_packet(payload) {
+            return None;
+        }
+        let number = header::number(payload);
+        let (len, frame_ns) = self.frame(payload);
+        let (azimuth_rad, turned_rad) = place_rad(i64::from(number) - i64::from(self.first), len);
+        let duration_ns = (frame_ns / len).max(1);
+        Some(Head {
+            device_ns: self.device_ns(payload),
+            sequence: Some(number),
+            azimuth_rad,
+            turned_rad,
+            rate_rad_per_ns: turned_rad / duration_ns as f64,
+            duration_ns,
+            left_out: None,
+            return_mode: self.mode(payload),
+        })
+    }
+
+    fn tally(&self, payload: &[u8]) -> Tally {
+        let mut tally = Tally::default();
+        if !self.is_packet(payload) {
+            return tally;
+        }
+        let returns = self.returns(payload);
+        match self.body {
+            Body::Blocks(blocks) if returns == 1 => {
+                self.singles(blocks, payload, |_, _| tally.points += 1);
+            }
+            Body::Blocks(blocks) => self.pairs(blocks, payload, |_, [one, other]| {
+                tally.add_pair(one.range, other.range);
+            }),
+            Body::Columns(columns) => {
+                let echo = |place: usize| self.cut(columns.echo(payload, place)).range;
+                for place in (0..columns.count()).step_by(returns) {
+                    let other = if returns == 2 { echo(place + 1) } else { 0 };
+                    tally.add_pair(echo(place), other);
+                }
+            }
+        }
+        tally
+    }
+
+    fn period_ns(&self, mode: ReturnMode) -> i64 {
+        FRAME_NS / self.packets(mode)
+    }
+
+    fn counting(&self) -> Counting {
+        Counting {
+            clock_wrap_ns: None,
+            sequence_bits: Some(16),
+        }
+    }
+
+    fn restarts(&self) -> Option<Restarts> {
+        Some(Restarts::EveryFrame)
+    }
+
+    fn has_rotor(&self) -> bool {
+        false
+    }
+
+    fn takes(&self, file: &UnitFile) -> bool {
+        match self.body {
+            Body::Columns(columns) => Angles::of_file(columns, file).is_some(),
+            Body::Blocks(_) => self.id == E1.id && description::is_e1(file),
+        }
+    }
+
+    fn describe(&self, files: &[UnitFile]) -> UnitFacts {
+        match self.body {
+            Body::Blocks(_) if self.id == E1.id => description::of_e1(files),
+            _ => UnitFacts::default(),
+        }
+    }
+
+    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
+        let table = Centidegrees::table();
+        let Body::Columns(columns) = self.body else {
+            return Ok(Fitted {
+                decoder: Box::new(SolidDecoder {
+                    model: *self,
+                    table,
+                    angles: None,
+                }),
+                calibration: Calibration::Factory,
+            });
+        };
+        let told = files
+            .iter()
+            .find_map(|file| Some((file, Angles::of_file(columns, file)?)));
+        let (angles, calibration) = match (told, columns) {
+            (Some((file, angles)), _) => (angles, Calibration::of(&[file], Calibration::Factory)),
+            (None, Columns::Emx) => (
+                Angles::nominal_emx(),
+                Calibration::Nominal { obtain: OBTAIN },
+            ),
+            (None, Columns::Em4) => {
+                return Err(UnitError::Missing {
+                    model: self.title,
+                    obtain: OBTAIN,
+                });
+            }
+        };
+        Ok(Fitted {
+            decoder: Box::new(SolidDecoder {
+                model: *self,
+                table,
+                angles: Some(angles),
+            }),
+            calibration,
+        })
+    }
+}
+
+struct SolidDecoder {
+    model: Solid,
+    table: Centidegrees,
+    /// Of the rows of columns.
+    angles: Option<Angles>,
+}
+
+/// Where and when a shot was fired.
+struct Ray {
+    direction: [f64; 3],
+    azimuth_rad: f32,
+    since_ns: i64,
+    ring: u16,
+    block: u16,
+}
+
+struct Work<'a> {
+    place: Place,
+    encoder_rad: f32,
+    out: &'a mut Decoded,
+}
+
+impl Work<'_> {
+    #[inline]
+    fn push(&mut self, ray: &Ray, echo: RawEcho, index: u8, kind: ReturnKind) {
+        let range_m = f64::from(echo.range) * UNIT_M;
+        self.out.cloud.push(&Return {
+            xyz_m: ray.direction.map(|part| (range_m * part) as f32),
+            time: self.place.time + ray.since_ns,
+            range_m: range_m as f32,
+            azimuth_rad: ray.azimuth_rad,
+            ring: ray.ring,
+            intensity: echo.intensity.into(),
+            return_index: index,
+            return_kind: kind,
+            packet: self.place.packet,
+            block: ray.block,
+        });
+        self.out.encoder_rad.push(self.encoder_rad);
+    }
+
+    fn push_pair(&mut self, ray: &Ray, echoes: [RawEcho; 2], mode: ReturnMode) {
+        let (kinds, merged) = judge(mode, &echoes);
+        self.out.merged += u64::from(merged);
+        for (index, (echo, kind)) in echoes.into_iter().zip(kinds).enumerate() {
+            if let Some(kind) = kind {
+                self.push(ray, echo, index as u8, kind);
+            }
+        }
+    }
+}
+
+impl SolidDecoder {
+    fn ray(&self, point: Point, shot: &Shot<'_>) -> Ray {
+        let aim = point.aim(shot.point, self.table);
+        Ray {
+            direction: aim.direction,
+            azimuth_rad: aim.azimuth_rad,
+            since_ns: shot.block.since_ns(),
+            ring: shot.channel as u16,
+            block: shot.number as u16,
+        }
+    }
+
+    fn columns(&self, columns: Columns, payload: &[u8], work: &mut Work<'_>) {
+        let Some(angles) = &self.angles else { return };
+        let mode = self.model.mode(payload);
+        let returns = mode.returns();
+        let lead_ns = columns.lead_ns(payload);
+        let aims = columns.aims(payload, angles);
+        for (place, slot) in columns.slots(payload, returns).enumerate().step_by(returns) {
+            let (direction, yaw_rad) = aims.row(slot.row, slot.row / columns.zone_rows(), angles);
+            let ray = Ray {
+                direction,
+                azimuth_rad: wrapped(yaw_rad),
+                since_ns: columns.since_ns(slot.row, lead_ns),
+                ring: slot.row as u16,
+                block: place as u16,
+            };
+            let echo = |place: usize| self.model.cut(columns.echo(payload, place));
+            if returns == 2 {
+                work.push_pair(&ray, [echo(place), echo(place + 1)], mode);
+            } else if echo(place).range != 0 {
+                work.push(&ray, echo(place), 0, single_kind(mode, 0));
+            }
+        }
+    }
+}
+
+impl Decoder for SolidDecoder {
+    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
+        let Some(head) = self.model.head(payload) else {
+            return out.drops.add("packet_size", 1);
+        };
+        let mode = head.return_mode;
+        let first = out.cloud.len();
+        let mut work = Work {
+            place,
+            encoder_rad: wrapped(head.azimuth_rad),
+            out,
+        };
+        match self.model.body {
+            Body::Columns(columns) => self.columns(columns, payload, &mut work),
+            Body::Blocks(blocks) if self.model.returns(payload) == 1 => {
+                self.model.singles(blocks, payload, |shot, echo| {
+                    let index = shot.block.return_index();
+                    let kind = single_kind(mode, index);
+                    work.push(&self.ray(blocks.point, &shot), echo, index, kind);
+                });
+            }
+            Body::Blocks(blocks) => self.model.pairs(blocks, payload, |shot, echoes| {
+                work.push_pair(&self.ray(blocks.point, &shot), echoes, mode);
+            }),
+        }
+        if let Body::Blocks(blocks) = self.model.body
+            && blocks.point != Point::Angles
+        {
+            let cloud = &mut out.cloud;
+            bear(&cloud.xyz_m[first..], &mut cloud.azimuth_rad[first..]);
+        }
+    }
+}

@@ -1,0 +1,155 @@
+//! Frames out of datagrams: every lidar's packets, sweeps and shares on a thread of their own.
+
+use rayon::prelude::*;
+
+use super::frames::{Frame, FrameAssembler, Share, share_of};
+use super::passthrough::PassThrough;
+use crate::capture::DatagramBatch;
+use crate::error::{InvalidValue, ReadError};
+use crate::frame::WorldFromSensor;
+use crate::stream::{ScanReport, SweepOptions, SweepReader};
+use crate::time::Timestamp;
+
+/// Sweeps before a frame that its shares may need, and the decoder to have got going.
+const RUN_UP_NS: i64 = 2_000_000_000;
+
+/// Which frames to make.
+#[derive(Debug, Clone)]
+pub struct FramePlan {
+    /// Numbers of the lidars within the scan, in the order of the shares.
+    pub lidars: Vec<usize>,
+    /// Pose of each.
+    pub poses: Vec<WorldFromSensor>,
+    /// Azimuth at which the sweeps of each are cut.
+    pub cut_azimuth_rad: Vec<f64>,
+    /// What belongs to the blade's surroundings.
+    pub pass: PassThrough,
+    /// Middle of the first frame.
+    pub first: Timestamp,
+    /// From frame to frame, nanoseconds.
+    pub period_ns: i64,
+    /// Packets before this are left out.
+    pub start: Timestamp,
+    /// Packets from this on are left out.
+    pub stop: Timestamp,
+}
+
+impl FramePlan {
+    /// The same frames from `first` on, without decoding what stands long before it.
+    pub fn from(&self, first: Timestamp) -> Self {
+        Self {
+            first,
+            start: self.start.max(first + -RUN_UP_NS),
+            ..self.clone()
+        }
+    }
+
+    fn options(&self, place: usize) -> SweepOptions {
+        let number = self.lidars[place];
+        let mut cuts = vec![0.0; number + 1];
+        cuts[number] = self.cut_azimuth_rad[place];
+        SweepOptions {
+            lidars: Some(vec![number]),
+            cut_azimuth_rad: cuts,
+            start: Some(self.start),
+            stop: Some(self.stop),
+        }
+    }
+}
+
+/// Turns batches of datagrams into frames; the frames do not depend on the number of threads.
+pub struct FrameReader {
+    lanes: Vec<Lane>,
+    pass: PassThrough,
+    assembler: FrameAssembler,
+}
+
+struct Lane {
+    reader: SweepReader,
+    pose: WorldFromSensor,
+    shares: Vec<(Timestamp, Share)>,
+}
+
+impl FrameReader {
+    /// Prepares for the capture that `report` was made of.
+    ///
+    /// # Errors
+    /// [`ReadError`] where a lidar cannot be decoded or the plan makes no sense.
+    pub fn new(report: &ScanReport, plan: &FramePlan) -> Result<Self, ReadError> {
+        let count = plan.lidars.len();
+        check_length("poses", plan.poses.len(), count)?;
+        check_length("cut_azimuth_rad", plan.cut_azimuth_rad.len(), count)?;
+        let lane = |place: usize| {
+            Ok(Lane {
+                reader: SweepReader::new(report, &plan.options(place))?,
+                pose: plan.poses[place],
+                shares: Vec::new(),
+            })
+        };
+        Ok(Self {
+            lanes: (0..count).map(lane).collect::<Result<_, ReadError>>()?,
+            pass: plan.pass,
+            assembler: FrameAssembler::new(count, plan.first, plan.period_ns)?,
+        })
+    }
+
+    /// Takes the next datagrams, lidars side by side.
+    pub fn push(&mut self, batch: &DatagramBatch) {
+        let pass = &self.pass;
+        self.lanes.par_iter_mut().for_each(|lane| {
+            for datagram in batch.iter() {
+                lane.reader.push(&datagram);
+                lane.take(pass);
+            }
+        });
+        self.assemble();
+    }
+
+    /// The capture has ended: what is not complete comes out.
+    pub fn finish(&mut self) {
+        for lane in &mut self.lanes {
+            lane.reader.finish();
+            lane.take(&self.pass);
+        }
+        self.assemble();
+        self.assembler.finish();
+    }
+
+    /// Whether all lidars have passed the end that was asked for.
+    pub fn is_done(&self) -> bool {
+        self.lanes.iter().all(|lane| lane.reader.is_done())
+    }
+
+    /// The next frame, when no later sweep can be nearer to it.
+    pub fn pop(&mut self) -> Option<Frame> {
+        self.assembler.pop()
+    }
+
+    fn assemble(&mut self) {
+        for (place, lane) in self.lanes.iter_mut().enumerate() {
+            for (middle, share) in lane.shares.drain(..) {
+                self.assembler.push(place, middle, share);
+            }
+        }
+    }
+}
+
+impl Lane {
+    fn take(&mut self, pass: &PassThrough) {
+        while let Some(sweep) = self.reader.pop() {
+            self.shares.push(share_of(&sweep, &self.pose, pass));
+            self.reader.recycle(sweep.lidar, sweep.cloud);
+        }
+    }
+}
+
+fn check_length(name: &'static str, found: usize, expected: usize) -> Result<(), InvalidValue> {
+    if found == expected {
+        return Ok(());
+    }
+    Err(InvalidValue {
+        name,
+        expected: format!("{expected}, one per lidar"),
+        found: found.to_string(),
+    })
+}

@@ -1,0 +1,15 @@
+//! The beam method: the blade of a drawing, what the lidars saw of it, and the adjustment of both.
+
+mod adjustment;
+mod blade;
+mod seen;
+
+use pyo3::prelude::*;
+
+/// Adds this file's classes to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<blade::BeamBlade>()?;
+    module.add_class::<seen::BeamSeen>()?;
+    module.add_class::<adjustment::BeamAdjustment>()?;
+    module.add_function(wrap_pyfunction!(seen::beam_seen, module)?)
+}

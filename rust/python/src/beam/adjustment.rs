@@ -1,0 +1,341 @@
+//! The adjustment of all holds, step by step.
+
+use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem, Stage};
+use lidar_deflect_core::beam::family::{Loading, Trust};
+use lidar_deflect_core::beam::rig::Rig;
+use lidar_deflect_core::beam::rows::{Tally, Weights};
+use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
+use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
+use lidar_deflect_core::error::InvalidValue;
+use lidar_deflect_core::frame::WorldFromSensor;
+use nalgebra::{DMatrix, DVector, Vector3};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+use super::blade::BeamBlade;
+use super::seen::BeamSeen;
+use crate::arrays;
+use crate::compute::compute;
+use crate::error::BorderResult;
+
+/// Holds, blade and lidars in one adjustment.
+#[pyclass(module = "lidar_deflect._native")]
+pub struct BeamAdjustment {
+    core: Adjustment,
+    threads: Option<usize>,
+}
+
+#[pymethods]
+impl BeamAdjustment {
+    /// `forces_n` (holds, saddles, 3) in world axes; `rig_prior` and `rig_covariance` of every lidar's
+    /// rotation, translation, elevation, scale and channel offsets.
+    #[new]
+    #[pyo3(signature = (
+        blade, seen, *, spans_ns, forces_n, full_n, poses, channels, rig_prior, rig_covariance, from_m,
+        trust, shape_trust, noise_m, surface_m, edge_rad, echoes, threads=None
+    ))]
+    #[allow(clippy::too_many_arguments)] // keywords of Python
+    fn new(
+        py: Python<'_>,
+        blade: &BeamBlade,
+        seen: Vec<PyRef<'_, BeamSeen>>,
+        spans_ns: Vec<(i64, i64)>,
+        forces_n: PyReadonlyArray3<'_, f64>,
+        full_n: PyReadonlyArray2<'_, f64>,
+        poses: PyReadonlyArray3<'_, f64>,
+        channels: Vec<usize>,
+        rig_prior: PyReadonlyArray1<'_, f64>,
+        rig_covariance: PyReadonlyArray2<'_, f64>,
+        from_m: f64,
+        trust: [f64; 5],
+        shape_trust: [f64; 6],
+        noise_m: f64,
+        surface_m: f64,
+        edge_rad: f64,
+        echoes: usize,
+        threads: Option<usize>,
+    ) -> BorderResult<Self> {
+        let forces = forces_n.as_array();
+        arrays::expect_rows("forces_n", forces.shape()[0], seen.len())?;
+        arrays::expect_rows("spans_ns", spans_ns.len(), seen.len())?;
+        let hold = |place: usize| Hold {
+            seen: seen[place].seen.clone(),
+            span_ns: spans_ns[place],
+            loading: Loading {
+                force_n: forces
+                    .index_axis(numpy::ndarray::Axis(0), place)
+                    .outer_iter()
+                    .map(|f| Vector3::new(f[0], f[1], f[2]))
+                    .collect(),
+                full_n: full_n
+                    .as_array()
+                    .outer_iter()
+                    .map(|f| f.iter().map(|x| x * x).sum::<f64>().sqrt())
+                    .sum(),
+            },
+        };
+        let [stiffness, weight, prebend, free_rad_m, root_rad] = trust;
+        let [
+            chord,
+            chord_waves,
+            setting_rad,
+            twist_waves_rad,
+            axis_fraction,
+            waves_m,
+        ] = shape_trust;
+        let shape = ShapeTrust {
+            chord,
+            chord_waves,
+            setting_rad,
+            twist_waves_rad,
+            axis_fraction,
+            waves_m,
+        };
+        let problem = Problem {
+            mesh: blade.mesh.clone(),
+            saddles: blade.saddles.clone(),
+            trust: Trust {
+                stiffness,
+                weight,
+                prebend,
+                free_rad_m,
+                root_rad,
+            },
+            shape: Shape::new(&blade.mesh, shape, from_m),
+            full_n: full_n
+                .as_array()
+                .outer_iter()
+                .map(|f| Vector3::new(f[0], f[1], f[2]))
+                .collect(),
+            holds: (0..seen.len()).map(hold).collect(),
+        };
+        let matrices = arrays::matrices("poses", &poses, channels.len())?;
+        let poses: Result<Vec<_>, _> = matrices.iter().map(WorldFromSensor::from_matrix).collect();
+        let covariance = rig_covariance.as_array();
+        let (rows, columns) = covariance.dim();
+        let weights = Weights {
+            noise_m: vec![noise_m; channels.len()],
+            surface_m,
+            edge_rad,
+            echoes,
+        };
+        let rig = Rig::new(
+            poses?,
+            channels,
+            DVector::from_iterator(
+                rig_prior.as_array().len(),
+                rig_prior.as_array().iter().copied(),
+            ),
+            DMatrix::from_fn(rows, columns, |i, j| covariance[(i, j)]),
+        )?;
+        let core = compute(py, threads, || Adjustment::new(problem, rig, weights))??;
+        Ok(Self { core, threads })
+    }
+
+    /// Solves the equilibria of all holds anew.
+    fn linearise(&mut self, py: Python<'_>) -> BorderResult<()> {
+        let core = &mut self.core;
+        Ok(compute(py, self.threads, || core.linearise())??)
+    }
+
+    /// One step with data inside of the gates; what became of them, by hold.
+    fn step<'py>(
+        &mut self,
+        py: Python<'py>,
+        echo_m: f64,
+        edge_m: f64,
+        stage: &str,
+    ) -> BorderResult<Bound<'py, PyDict>> {
+        let core = &mut self.core;
+        let gates = Gates {
+            echo_m,
+            edge_m,
+            stage: stage_named(stage)?,
+        };
+        let step = compute(py, self.threads, || core.step(&gates))??;
+        let told = PyDict::new(py);
+        told.set_item("largest", step.largest)?;
+        let holds: PyResult<Vec<_>> = step.tallies.iter().map(|t| tally(py, t)).collect();
+        told.set_item("holds", holds?)?;
+        told.set_item("noise_m", self.core.weights.noise_m.clone())?;
+        Ok(told)
+    }
+
+    /// Values (holds * sections, 4) and joint covariance of x, y, z, twist of the sections.
+    fn sections<'py>(
+        &self,
+        py: Python<'py>,
+        s_m: Vec<f64>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let gates = Gates {
+            echo_m,
+            edge_m,
+            stage: Stage::All,
+        };
+        let found = compute(py, self.threads, || self.core.sections(&s_m, &gates))??;
+        let count = found.covariance.nrows();
+        let values = found.values.as_flattened().to_vec();
+        let covariance = found.covariance.as_slice().to_vec();
+        Ok((
+            arrays::table(py, values, 4)?,
+            arrays::table(py, covariance, count)?,
+        ))
+    }
+
+    /// States of the sections within a hold at instants, (times * sections, 4), and their variances.
+    fn states<'py>(
+        &self,
+        py: Python<'py>,
+        hold: usize,
+        s_m: Vec<f64>,
+        times_ns: Vec<i64>,
+    ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
+        let at = |time: &i64| self.core.states_at(&self.core, hold, &s_m, *time).0;
+        let values: Vec<[f64; 4]> =
+            compute(py, self.threads, || times_ns.iter().flat_map(at).collect())?;
+        Ok(arrays::rows(py, values)?)
+    }
+
+    /// Instants at which `follow` wants the load of a stretch of time.
+    #[staticmethod]
+    fn load_knots(span_ns: (i64, i64)) -> Vec<i64> {
+        load_knots(span_ns)
+    }
+
+    /// Follows stretches of time (what was seen, span, load at its knots, instants): per stretch the
+    /// states (times * sections, 4), their variances from noise, and what became of the data.
+    #[allow(clippy::type_complexity)] // the three that Python unpacks
+    fn follow<'py>(
+        &self,
+        py: Python<'py>,
+        seen: Vec<PyRef<'py, BeamSeen>>,
+        spans_ns: Vec<(i64, i64)>,
+        loads: Vec<Vec<f64>>,
+        times_ns: Vec<Vec<i64>>,
+        s_m: Vec<f64>,
+        hold_loads: Vec<f64>,
+        gates: Vec<(f64, f64)>,
+    ) -> BorderResult<
+        Vec<
+            Option<(
+                Bound<'py, PyArray2<f64>>,
+                Bound<'py, PyArray2<f64>>,
+                Bound<'py, PyDict>,
+            )>,
+        >,
+    > {
+        let stretches: Vec<Stretch> = seen
+            .iter()
+            .zip(spans_ns.iter().zip(&loads))
+            .map(|(seen, (span, load))| Stretch {
+                seen: seen.seen.clone(),
+                span_ns: *span,
+                load: load.clone(),
+            })
+            .collect();
+        let gates: Vec<Gates> = gates
+            .iter()
+            .map(|(echo_m, edge_m)| Gates {
+                echo_m: *echo_m,
+                edge_m: *edge_m,
+                stage: Stage::All,
+            })
+            .collect();
+        let core = &self.core;
+        let follow = |(stretch, times): (&Stretch, &Vec<i64>)| {
+            let mut part = core.stretch(stretch, &hold_loads).ok()?;
+            part.follow(core, &s_m, times, &gates).ok()
+        };
+        let found: Vec<_> = compute(py, self.threads, || {
+            stretches
+                .par_iter()
+                .zip(times_ns.par_iter())
+                .map(follow)
+                .collect()
+        })?;
+        let hand = |followed: Option<Followed>| -> PyResult<_> {
+            let Some(f) = followed else { return Ok(None) };
+            let parts = (
+                arrays::rows(py, f.values)?,
+                arrays::rows(py, f.variances)?,
+                tally(py, &f.tally)?,
+            );
+            Ok(Some(parts))
+        };
+        Ok(found.into_iter().map(hand).collect::<PyResult<Vec<_>>>()?)
+    }
+
+    /// All unknowns, in standard deviations; those of the lidars in their own units.
+    fn values<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let mut values = self.core.values.as_slice().to_vec();
+        let first = self.core.layout.lidar_at(0);
+        for (place, value) in self.core.rig.values.iter().enumerate() {
+            values[first + place] = *value;
+        }
+        values.into_pyarray(py)
+    }
+
+    /// Where groups of unknowns start.
+    fn layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let layout = &self.core.layout;
+        let told = PyDict::new(py);
+        told.set_item("own", layout.own_at(0))?;
+        told.set_item("sway", layout.sway_at(0))?;
+        told.set_item("rig", layout.lidar_at(0))?;
+        told.set_item("shape", layout.shape_at())?;
+        told.set_item("edge", layout.edge_at())?;
+        told.set_item("len", layout.len())?;
+        Ok(told)
+    }
+}
+
+fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    let used = &tally.used;
+    told.set_item("time_ns", column(py, used.iter().map(|u| u.time_ns)))?;
+    told.set_item("lidar", column(py, used.iter().map(|u| u.lidar as u32)))?;
+    told.set_item("ring", column(py, used.iter().map(|u| u.ring as u32)))?;
+    told.set_item("s_m", column(py, used.iter().map(|u| u.s_m)))?;
+    told.set_item("residual_m", column(py, used.iter().map(|u| u.residual_m)))?;
+    told.set_item(
+        "xyz_m",
+        arrays::rows(
+            py,
+            used.iter()
+                .map(|u| u.point.into())
+                .collect::<Vec<[f64; 3]>>(),
+        )?,
+    )?;
+    told.set_item("edges", tally.edges.clone())?;
+    told.set_item("missed", tally.missed)?;
+    told.set_item("rejected", tally.rejected)?;
+    told.set_item("unfit", tally.unfit)?;
+    told.set_item("edges_left_out", tally.edges_left_out)?;
+    Ok(told)
+}
+
+fn column<T: numpy::Element>(
+    py: Python<'_>,
+    values: impl Iterator<Item = T>,
+) -> Bound<'_, PyArray1<T>> {
+    values.collect::<Vec<T>>().into_pyarray(py)
+}
+
+fn stage_named(name: &str) -> Result<Stage, InvalidValue> {
+    match name {
+        "loads" => Ok(Stage::Loads),
+        "blade" => Ok(Stage::Blade),
+        "all" => Ok(Stage::All),
+        _ => Err(InvalidValue {
+            name: "stage",
+            expected: "loads, blade or all".into(),
+            found: name.into(),
+        }),
+    }
+}
