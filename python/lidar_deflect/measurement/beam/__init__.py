@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.measurement.beam.adjustment import LAST, Solved, solve
+from lidar_deflect.measurement.beam.check import contradictions, objects
 from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
@@ -73,7 +74,7 @@ def measure(inputs: Inputs) -> States:
         blade_points=followed.used,
         contour=_contour(times_ns, stations, followed, uncertainty, len(sections), every),
         points=_points(inputs, followed),
-        rejected=_rejected(),
+        rejected=objects(solved),
         u_position_m=uncertainty.position_m[:, of],
         u_deflection_m=uncertainty.deflection_m[:, of],
         u_total_m=uncertainty.total_m[:, of],
@@ -81,6 +82,7 @@ def measure(inputs: Inputs) -> States:
         u_twist_deg=np.degrees(uncertainty.twist_rad[:, of]),
         evidence=_evidence(expected, solved),
         warnings=_warnings(solved),
+        failed=contradictions(inputs, solved),
     )
 
 
@@ -172,17 +174,6 @@ def _points(inputs: Inputs, followed: Followed) -> Mapping[str, Any]:
     }
 
 
-def _rejected() -> Mapping[str, Any]:
-    empty = np.zeros(0)
-    return {
-        "time": np.zeros(0, dtype=np.int64),
-        "reason": [],
-        "count": np.zeros(0, dtype=np.uint32),
-        "s_m": empty,
-        **{f"{axis}_m": empty for axis in "xyz"},
-    }
-
-
 def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
     holds = [
         {
@@ -192,7 +183,7 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
             "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2)))
             if len(told["residual_m"])
             else None,
-            "rejected": told["rejected"],
+            "rejected": len(told["rejected"]["s_m"]),
             "edges": len(told["edges"]),
             "edges_left_out": list(told["edges_left_out"]),
         }
@@ -208,6 +199,12 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
 
 
 def _warnings(solved: Solved) -> list[str]:
+    said = []
+    if solved.source == "generic":
+        said.append(
+            "no drawing with contours and stiffness: the blade's shape is learned from the lidars, "
+            "and what none of them saw of it is that of blades in general"
+        )
     if abs(solved.shares[0]) > 0.0:
-        return ["no unloaded hold: deflections are since the hold with least load"]
-    return []
+        said.append("no unloaded hold: deflections are since the hold with least load")
+    return said

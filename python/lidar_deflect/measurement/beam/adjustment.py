@@ -11,7 +11,7 @@ import numpy as np
 from lidar_deflect import _native
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
-from lidar_deflect.measurement.beam.drawing import drawing_of
+from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
 from lidar_deflect.measurement.beam.rig import rig_prior
 
 if TYPE_CHECKING:
@@ -63,6 +63,8 @@ class Solved:
         What became of the data in the last step.
     steps
         Steps it took.
+    source
+        Where the blade's shape began: ``drawing`` or ``generic``.
     """
 
     native: _native.BeamAdjustment
@@ -71,6 +73,7 @@ class Solved:
     shares: tuple[float, ...]
     told: Mapping[str, Any]
     steps: int
+    source: str
 
 
 def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
@@ -118,18 +121,19 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     order = np.argsort([abs(share) for share in shares], kind="stable")
     holds, spans = tuple(holds[i] for i in order), tuple(spans[i] for i in order)
     shares = tuple(shares[i] for i in order)
-    native = _started(inputs, expected, spans, shares)
+    drawing = drawing_of(inputs)
+    native = _started(inputs, drawing, expected, spans, shares)
     told, steps = _settle(native, inputs)
-    return Solved(native, holds, spans, shares, told, steps)
+    return Solved(native, holds, spans, shares, told, steps, drawing.source)
 
 
 def _started(
     inputs: Inputs,
+    drawing: Drawing,
     expected: Expected,
     spans: Sequence[tuple[int, int]],
     shares: Sequence[float],
 ) -> _native.BeamAdjustment:
-    drawing = drawing_of(inputs.config)
     forces = drawing.blade.forces_for(
         expected.direction, expected.s_m.tolist(), expected.deflection_m.tolist()
     )
