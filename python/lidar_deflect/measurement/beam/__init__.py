@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement.beam.adjustment import LAST, Solved, solve
 from lidar_deflect.measurement.beam.check import contradictions, objects
 from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
+from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
 from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States
 
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
+
+__all__ = ["calibrated_reference", "measure", "moments"]
 
 STATION_M = 1.0
 """Distance between stations of the blade line in the table `contour`."""
@@ -53,9 +57,9 @@ def measure(inputs: Inputs) -> States:
     s_m = np.array([*sections, *stations])
     followed = follow(inputs, expected, solved, s_m, times_ns)
     covariance = HoldCovariance.of(solved, s_m, LAST)
-    reference = _reference(inputs, followed, times_ns, covariance)
+    reference, spread = _reference(inputs, s_m, followed, times_ns, covariance)
     moved = followed.values[..., :3] - reference
-    uncertainty = over_time(covariance, solved, expected, followed, times_ns, moved)
+    uncertainty = over_time(covariance, spread, solved, expected, followed, times_ns, moved)
     of = slice(0, len(sections))
     status, reason = _grades(followed)
     every = max(1, round(inputs.rate_hz))
@@ -95,17 +99,36 @@ def moments(inputs: Inputs) -> NDArray[np.int64]:
 
 
 def _reference(
-    inputs: Inputs, followed: Followed, times_ns: NDArray[np.int64], covariance: HoldCovariance
-) -> Floats:
-    """Unloaded position of every section, shape (s, 3): the mean of the unloaded hold's states."""
+    inputs: Inputs,
+    s_m: Floats,
+    followed: Followed,
+    times_ns: NDArray[np.int64],
+    covariance: HoldCovariance,
+) -> tuple[Floats, Floats]:
+    """Unloaded position of every section (s, 3), and covariance of the deflection in each hold.
+
+    The position is the mean of the unloaded hold's states, else that of the calibration.
+    """
     if inputs.unloaded_ns is None:
-        return np.asarray(covariance.values[0, :, :3])
+        return _kept_reference(inputs, s_m, covariance)
     inside = (times_ns >= inputs.unloaded_ns[0]) & (times_ns <= inputs.unloaded_ns[1])
     states = followed.values[inside, :, :3]
     known = ~np.isnan(states).any(axis=(1, 2))
-    if not known.any():
-        return np.asarray(covariance.values[0, :, :3])
-    return np.asarray(states[known].mean(axis=0))
+    position = states[known].mean(axis=0) if known.any() else covariance.values[0, :, :3]
+    return np.asarray(position), covariance.deflection_covariance()
+
+
+def _kept_reference(
+    inputs: Inputs, s_m: Floats, covariance: HoldCovariance
+) -> tuple[Floats, Floats]:
+    if "beam" not in inputs.calibration.reference:
+        raise MeasurementError(
+            "neither these captures nor the calibration have the unloaded blade",
+            code="measurement.no_reference",
+            hint='calibrate from a capture with an unloaded hold, with method = "beam"',
+        )
+    position, own = Kept.from_dict(inputs.calibration.reference["beam"]).at(s_m)
+    return position, covariance.position_covariance() + own
 
 
 def _stations(inputs: Inputs) -> list[float]:
@@ -206,5 +229,7 @@ def _warnings(solved: Solved) -> list[str]:
             "and what none of them saw of it is that of blades in general"
         )
     if abs(solved.shares[0]) > 0.0:
-        said.append("no unloaded hold: deflections are since the hold with least load")
+        said.append(
+            "no unloaded hold in these captures: the twist is since the hold with least load"
+        )
     return said

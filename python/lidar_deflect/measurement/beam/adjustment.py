@@ -36,6 +36,8 @@ SEEN_SHARE = 0.45
 ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
 
+FAR = ((6.0, 5.0), (6.0, 5.0), (4.0, 3.0))
+"""The same before them where no drawing tells the prebend."""
 LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
 BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
 ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
@@ -123,7 +125,7 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     shares = tuple(shares[i] for i in order)
     drawing = drawing_of(inputs)
     native = _started(inputs, drawing, expected, spans, shares)
-    told, steps = _settle(native, inputs)
+    told, steps = _settle(native, inputs, is_far=drawing.source == "generic")
     return Solved(native, holds, spans, shares, told, steps, drawing.source)
 
 
@@ -166,9 +168,12 @@ def _started(
     )
 
 
-def _settle(native: _native.BeamAdjustment, inputs: Inputs) -> tuple[Mapping[str, Any], int]:
+def _settle(
+    native: _native.BeamAdjustment, inputs: Inputs, *, is_far: bool
+) -> tuple[Mapping[str, Any], int]:
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
-    schedule = [*((*gate, "loads") for gate in LOADS), *((*gate, "blade") for gate in BLADE)]
+    loads = (*FAR, *LOADS) if is_far else LOADS
+    schedule = [*((*gate, "loads") for gate in loads), *((*gate, "blade") for gate in BLADE)]
     schedule += [(*gate, "all") for gate in ALL]
     listener = inputs.listener("adjust")
     total = len(schedule) + MAX_LAST
