@@ -58,7 +58,7 @@ def test_every_number_and_path_of_the_models_has_a_meaning() -> None:
 def test_little_needs_to_be_said(tmp_path: Path) -> None:
     config = cfg.load(written(tmp_path, MINIMAL))
     assert config.lidars[0].model == "auto"
-    assert config.measure.method == "paper"
+    assert config.measure.method == "beam"
     assert config.paper.mu == 1.5
 
 

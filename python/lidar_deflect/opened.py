@@ -153,6 +153,7 @@ class OpenedTest:
             start_ns=limits[0],
             stop_ns=limits[1],
             rate_hz=rate_hz or self.config.measure.rate_hz,
+            load=self.load,
             progress=self.progress,
             threads=self.threads,
         )

@@ -20,7 +20,7 @@ from lidar_deflect.calibrate import calibrate
 from lidar_deflect.calibration import Calibration, with_reference
 from lidar_deflect.checks import check
 from lidar_deflect.errors import ConfigError
-from lidar_deflect.measurement import METHODS, paper, tabulate, unloaded
+from lidar_deflect.measurement import METHODS, beam, paper, tabulate, unloaded
 from lidar_deflect.measurement.health import health_table
 from lidar_deflect.opened import OpenedTest
 from lidar_deflect.result import Result
@@ -207,7 +207,11 @@ def with_unloaded_state(
 ) -> Calibration:
     """Return the calibration with the state of the unloaded blade, so that it serves other runs."""
     inputs = opened.inputs(calibration, clouds, window_ns, limits=window_ns)
-    return with_reference(calibration, "paper", paper.calibrated_reference(inputs))
+    known = with_reference(calibration, "paper", paper.calibrated_reference(inputs))
+    if opened.config.measure.method != "beam":
+        return known
+    inputs = opened.inputs(known, clouds, window_ns, limits=window_ns)
+    return with_reference(known, "beam", beam.calibrated_reference(inputs))
 
 
 def result_of(

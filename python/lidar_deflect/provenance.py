@@ -8,6 +8,8 @@ import time
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
@@ -68,7 +70,7 @@ def run_document(
             *(each.text() for each in matches if each.applied_s),
         ],
         "timings_s": {stage: round(seconds, 3) for stage, seconds in watch.laps.items()},
-        "gates": gates(opened.config, health, opened.absent),
+        "gates": gates(opened.config, health, opened.absent, states),
     }
 
 
@@ -90,7 +92,9 @@ def file_facts(path: Path) -> Mapping[str, Any]:
     return {"file": path.name, "bytes": path.stat().st_size, "sha256": digest.hexdigest()}
 
 
-def gates(config: Config, health: pl.DataFrame, absent: Sequence[str]) -> Mapping[str, Any]:
+def gates(
+    config: Config, health: pl.DataFrame, absent: Sequence[str], states: States
+) -> Mapping[str, Any]:
     """Judge a run by the limits of ``[gates]`` and by what should have been there.
 
     Returns
@@ -106,7 +110,22 @@ def gates(config: Config, health: pl.DataFrame, absent: Sequence[str]) -> Mappin
         for id, percent in lost.items()
         if percent > limit
     ]
+    failed += _too_uncertain(config, states)
+    failed += states.failed
     return {"failed": failed, "lost_percent": lost}
+
+
+def _too_uncertain(config: Config, states: States) -> list[str]:
+    """Name the sections whose median standard uncertainty is beyond the gate."""
+    if states.u_total_m is None:
+        return []
+    limit = config.gates.max_u_m
+    medians = np.nanmedian(states.u_total_m, axis=0)
+    return [
+        f"section {name}: the deflection's standard uncertainty is {u_m:.3f} m, above {limit:g} m"
+        for name, u_m in zip(states.names, medians, strict=True)
+        if u_m > limit
+    ]
 
 
 def _lost_percent(health: pl.DataFrame) -> dict[str, float]:

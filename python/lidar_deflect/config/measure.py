@@ -10,7 +10,7 @@ from lidar_deflect.config.base import Count, Flag, Model, NotNegative, Positive,
 class Measure(Model):
     """Which method, and how often."""
 
-    method: Literal["beam", "paper"] = Field(default="paper", description="paper | beam")
+    method: Literal["beam", "paper"] = Field(default="beam", description="beam | paper")
     rate_hz: Positive = Field(default=10.0, le=1000, description="states per second")
 
 

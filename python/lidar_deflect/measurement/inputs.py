@@ -10,6 +10,7 @@ if TYPE_CHECKING:
 
     from lidar_deflect.calibration import Calibration
     from lidar_deflect.capture import Capture
+    from lidar_deflect.channels import Channel
     from lidar_deflect.config import Config
     from lidar_deflect.measurement.unloaded import HoldCloud
 
@@ -32,6 +33,8 @@ class Inputs:
         Limits of the measurement.
     rate_hz
         States per second.
+    load
+        Load in percent by the clock of the lidars; None without a channel.
     progress
         Told the stage, what is done and what there is to do.
     """
@@ -45,6 +48,7 @@ class Inputs:
     start_ns: int
     stop_ns: int
     rate_hz: float
+    load: Channel | None = None
     progress: Progress | None = None
     threads: int | None = None
 

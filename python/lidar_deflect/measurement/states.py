@@ -49,6 +49,8 @@ class States:
         What was decided on the way, for run.json.
     warnings
         Sentences for the user.
+    failed
+        Where the data contradict the method's model: sentences; the run exits with 6.
     """
 
     time_ns: NDArray[np.int64]
@@ -71,6 +73,7 @@ class States:
     u_twist_deg: Floats | None = None
     evidence: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
+    failed: Sequence[str] = ()
 
     @property
     def deflection_m(self) -> Floats:

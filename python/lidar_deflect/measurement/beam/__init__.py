@@ -10,9 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement.beam.adjustment import LAST, Solved, solve
+from lidar_deflect.measurement.beam.check import contradictions, objects
 from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
+from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
 from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States
 
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
     from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
+
+__all__ = ["calibrated_reference", "measure", "moments"]
 
 STATION_M = 1.0
 """Distance between stations of the blade line in the table `contour`."""
@@ -52,9 +57,9 @@ def measure(inputs: Inputs) -> States:
     s_m = np.array([*sections, *stations])
     followed = follow(inputs, expected, solved, s_m, times_ns)
     covariance = HoldCovariance.of(solved, s_m, LAST)
-    reference = _reference(inputs, followed, times_ns, covariance)
+    reference, spread = _reference(inputs, s_m, followed, times_ns, covariance)
     moved = followed.values[..., :3] - reference
-    uncertainty = over_time(covariance, solved, expected, followed, times_ns, moved)
+    uncertainty = over_time(covariance, spread, solved, expected, followed, times_ns, moved)
     of = slice(0, len(sections))
     status, reason = _grades(followed)
     every = max(1, round(inputs.rate_hz))
@@ -73,7 +78,7 @@ def measure(inputs: Inputs) -> States:
         blade_points=followed.used,
         contour=_contour(times_ns, stations, followed, uncertainty, len(sections), every),
         points=_points(inputs, followed),
-        rejected=_rejected(),
+        rejected=objects(solved),
         u_position_m=uncertainty.position_m[:, of],
         u_deflection_m=uncertainty.deflection_m[:, of],
         u_total_m=uncertainty.total_m[:, of],
@@ -81,6 +86,7 @@ def measure(inputs: Inputs) -> States:
         u_twist_deg=np.degrees(uncertainty.twist_rad[:, of]),
         evidence=_evidence(expected, solved),
         warnings=_warnings(solved),
+        failed=contradictions(inputs, solved),
     )
 
 
@@ -93,17 +99,36 @@ def moments(inputs: Inputs) -> NDArray[np.int64]:
 
 
 def _reference(
-    inputs: Inputs, followed: Followed, times_ns: NDArray[np.int64], covariance: HoldCovariance
-) -> Floats:
-    """Unloaded position of every section, shape (s, 3): the mean of the unloaded hold's states."""
+    inputs: Inputs,
+    s_m: Floats,
+    followed: Followed,
+    times_ns: NDArray[np.int64],
+    covariance: HoldCovariance,
+) -> tuple[Floats, Floats]:
+    """Unloaded position of every section (s, 3), and covariance of the deflection in each hold.
+
+    The position is the mean of the unloaded hold's states, else that of the calibration.
+    """
     if inputs.unloaded_ns is None:
-        return np.asarray(covariance.values[0, :, :3])
+        return _kept_reference(inputs, s_m, covariance)
     inside = (times_ns >= inputs.unloaded_ns[0]) & (times_ns <= inputs.unloaded_ns[1])
     states = followed.values[inside, :, :3]
     known = ~np.isnan(states).any(axis=(1, 2))
-    if not known.any():
-        return np.asarray(covariance.values[0, :, :3])
-    return np.asarray(states[known].mean(axis=0))
+    position = states[known].mean(axis=0) if known.any() else covariance.values[0, :, :3]
+    return np.asarray(position), covariance.deflection_covariance()
+
+
+def _kept_reference(
+    inputs: Inputs, s_m: Floats, covariance: HoldCovariance
+) -> tuple[Floats, Floats]:
+    if "beam" not in inputs.calibration.reference:
+        raise MeasurementError(
+            "neither these captures nor the calibration have the unloaded blade",
+            code="measurement.no_reference",
+            hint='calibrate from a capture with an unloaded hold, with method = "beam"',
+        )
+    position, own = Kept.from_dict(inputs.calibration.reference["beam"]).at(s_m)
+    return position, covariance.position_covariance() + own
 
 
 def _stations(inputs: Inputs) -> list[float]:
@@ -172,17 +197,6 @@ def _points(inputs: Inputs, followed: Followed) -> Mapping[str, Any]:
     }
 
 
-def _rejected() -> Mapping[str, Any]:
-    empty = np.zeros(0)
-    return {
-        "time": np.zeros(0, dtype=np.int64),
-        "reason": [],
-        "count": np.zeros(0, dtype=np.uint32),
-        "s_m": empty,
-        **{f"{axis}_m": empty for axis in "xyz"},
-    }
-
-
 def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
     holds = [
         {
@@ -192,7 +206,7 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
             "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2)))
             if len(told["residual_m"])
             else None,
-            "rejected": told["rejected"],
+            "rejected": len(told["rejected"]["s_m"]),
             "edges": len(told["edges"]),
             "edges_left_out": list(told["edges_left_out"]),
         }
@@ -208,6 +222,14 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
 
 
 def _warnings(solved: Solved) -> list[str]:
+    said = []
+    if solved.source == "generic":
+        said.append(
+            "no drawing with contours and stiffness: the blade's shape is learned from the lidars, "
+            "and what none of them saw of it is that of blades in general"
+        )
     if abs(solved.shares[0]) > 0.0:
-        return ["no unloaded hold: deflections are since the hold with least load"]
-    return []
+        said.append(
+            "no unloaded hold in these captures: the twist is since the hold with least load"
+        )
+    return said

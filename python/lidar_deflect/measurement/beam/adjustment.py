@@ -11,7 +11,7 @@ import numpy as np
 from lidar_deflect import _native
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
-from lidar_deflect.measurement.beam.drawing import drawing_of
+from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
 from lidar_deflect.measurement.beam.rig import rig_prior
 
 if TYPE_CHECKING:
@@ -36,6 +36,8 @@ SEEN_SHARE = 0.45
 ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
 
+FAR = ((6.0, 5.0), (6.0, 5.0), (4.0, 3.0))
+"""The same before them where no drawing tells the prebend."""
 LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
 BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
 ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
@@ -63,6 +65,8 @@ class Solved:
         What became of the data in the last step.
     steps
         Steps it took.
+    source
+        Where the blade's shape began: ``drawing`` or ``generic``.
     """
 
     native: _native.BeamAdjustment
@@ -71,6 +75,7 @@ class Solved:
     shares: tuple[float, ...]
     told: Mapping[str, Any]
     steps: int
+    source: str
 
 
 def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
@@ -118,18 +123,19 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     order = np.argsort([abs(share) for share in shares], kind="stable")
     holds, spans = tuple(holds[i] for i in order), tuple(spans[i] for i in order)
     shares = tuple(shares[i] for i in order)
-    native = _started(inputs, expected, spans, shares)
-    told, steps = _settle(native, inputs)
-    return Solved(native, holds, spans, shares, told, steps)
+    drawing = drawing_of(inputs)
+    native = _started(inputs, drawing, expected, spans, shares)
+    told, steps = _settle(native, inputs, is_far=drawing.source == "generic")
+    return Solved(native, holds, spans, shares, told, steps, drawing.source)
 
 
 def _started(
     inputs: Inputs,
+    drawing: Drawing,
     expected: Expected,
     spans: Sequence[tuple[int, int]],
     shares: Sequence[float],
 ) -> _native.BeamAdjustment:
-    drawing = drawing_of(inputs.config)
     forces = drawing.blade.forces_for(
         expected.direction, expected.s_m.tolist(), expected.deflection_m.tolist()
     )
@@ -162,9 +168,12 @@ def _started(
     )
 
 
-def _settle(native: _native.BeamAdjustment, inputs: Inputs) -> tuple[Mapping[str, Any], int]:
+def _settle(
+    native: _native.BeamAdjustment, inputs: Inputs, *, is_far: bool
+) -> tuple[Mapping[str, Any], int]:
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
-    schedule = [*((*gate, "loads") for gate in LOADS), *((*gate, "blade") for gate in BLADE)]
+    loads = (*FAR, *LOADS) if is_far else LOADS
+    schedule = [*((*gate, "loads") for gate in loads), *((*gate, "blade") for gate in BLADE)]
     schedule += [(*gate, "all") for gate in ALL]
     listener = inputs.listener("adjust")
     total = len(schedule) + MAX_LAST

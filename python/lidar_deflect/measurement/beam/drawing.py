@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lidar_deflect import _native, geometry
-from lidar_deflect.errors import ConfigError
+from lidar_deflect.measurement import paper
 from lidar_deflect.measurement.beam import generic
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidar_deflect.config import Config
+    from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
 
@@ -41,8 +42,8 @@ class Drawing:
         Prior deviations of stiffness, weight, prebend (relative), stress-free curvature (rad/m) and
         the root's rotation (rad).
     shape_trust
-        Of chord, its waves (relative), setting angle, waves of twist (rad), axis (chord lengths) and
-        waves of the surface (m).
+        Of chord and its waves (relative), setting angle and waves of twist (rad), axis (chord
+        lengths) and waves of the surface (m).
     source
         ``drawing`` or ``generic``.
     """
@@ -53,40 +54,36 @@ class Drawing:
     source: str
 
 
-def drawing_of(config: Config) -> Drawing:
-    """Take the drawing, else a blade as blades are.
-
-    Raises
-    ------
-    ConfigError
-        If the sides of the blade are not given.
-    """
-    blade = config.blade
-    if blade.leading_edge is None or blade.suction_side is None:
-        raise _lacking("leading_edge and suction_side")
+def drawing_of(inputs: Inputs) -> Drawing:
+    """Take the drawing, else a blade as blades are."""
+    blade, sides = inputs.config.blade, sides_of(inputs)
     given = geometry.read_geometry(blade)
     setting_rad = float(np.radians(blade.setting_u_deg))
     columns = None if given is None else _columns(given.stations)
     if given is None or given.contours is None or columns is None:
         at_m, outlines = generic.outlines(blade)
-        native = _native_of(config, generic.stations(blade), at_m, outlines)
+        native = _native_of(inputs.config, sides, generic.stations(blade), at_m, outlines)
         shape = (0.1, 0.05, max(setting_rad, 0.03), 0.02, blade.axis_fraction_u, 0.02)
-        return Drawing(native, (0.25, 0.7, 0.0, 1.5e-4, 2e-3), shape, "generic")
+        return Drawing(native, (0.25, 0.7, 0.0, 4e-4, 2e-3), shape, "generic")
     outlines = np.stack([given.contours.x_c, given.contours.y_c], axis=2)
-    native = _native_of(config, columns, given.contours.s_m, outlines)
+    native = _native_of(inputs.config, sides, columns, given.contours.s_m, outlines)
     shape = (0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002)
     return Drawing(native, (0.05, 0.5, 0.05, 1.5e-5, 1e-3), shape, "drawing")
 
 
 def _native_of(
-    config: Config, stations: Floats, outline_s_m: Floats, outlines: Floats
+    config: Config,
+    sides: tuple[Floats, Floats],
+    stations: Floats,
+    outline_s_m: Floats,
+    outlines: Floats,
 ) -> _native.BeamBlade:
     return _native.BeamBlade(
         stations,
         outline_s_m.tolist(),
         outlines,
-        leading_edge=np.array(config.blade.leading_edge, dtype=np.float64),
-        suction_side=np.array(config.blade.suction_side, dtype=np.float64),
+        leading_edge=sides[0],
+        suction_side=sides[1],
         saddles_s_m=saddles_m(config),
     )
 
@@ -109,9 +106,19 @@ def _columns(stations: geometry.Stations) -> Floats | None:
     )
 
 
-def _lacking(what: str) -> ConfigError:
-    return ConfigError(
-        f"the beam method needs {what} of [blade]",
-        code="config.no_geometry",
-        hint='give it, or measure with method = "paper"',
+def sides_of(inputs: Inputs) -> tuple[Floats, Floats]:
+    """Where leading edge and suction side point; what is not given is guessed.
+
+    The leading edge is then that of the plan, and the suction side the one that faces up, or along
+    the load where the chord stands upright.
+    """
+    given = inputs.config.blade
+    leading_edge = (
+        paper.plan_of(inputs).leading_edge if given.leading_edge is None else given.leading_edge
     )
+    leading = np.array(leading_edge, dtype=np.float64)
+    if given.suction_side is not None:
+        return leading, np.array(given.suction_side, dtype=np.float64)
+    across = np.cross([0.0, 0.0, 1.0], leading)
+    towards = np.array([0.2, 1.0, 0.0])
+    return leading, across * (1.0 if across @ towards >= 0.0 else -1.0)

@@ -73,7 +73,7 @@ def expected_of(inputs: Inputs) -> Expected:
     MeasurementError
         If there is neither a load channel with a prediction nor a result of the paper's method.
     """
-    load, predicted = instruments.load(inputs.config), instruments.prediction(inputs.config)
+    load, predicted = inputs.load, instruments.prediction(inputs.config)
     if load is not None and predicted is not None:
         s_m, deflection_m = _totals(predicted)
         return Expected(

@@ -1,7 +1,7 @@
 """A blade as blades are, scaled to its length: the start where no drawing is given.
 
-Chord, twist, thickness and stiffness follow round numbers that lie between published blades of 60 to
-140 m; none is copied. What the built blade differs by is then learned from the lidars.
+Chord, twist, thickness and stiffness follow round numbers that lie between published blades of
+60 to 140 m; none is copied. What the built blade differs by is then learned from the lidars.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class RigPrior:
     channels
         Channels of each lidar.
     values, covariance
-        Per lidar rotation (rad), translation (m), elevation (rad), range scale, channel offsets (m).
+        Per lidar rotation (rad), translation (m), elevation (rad), range scale, offsets (m).
     """
 
     poses: Floats

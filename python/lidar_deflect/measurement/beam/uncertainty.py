@@ -46,6 +46,14 @@ class HoldCovariance:
         flat = self.covariance.reshape(holds * sections * 4, -1)
         return np.asarray(np.diag(flat).reshape(holds, sections, 4))
 
+    def position_covariance(self) -> Floats:
+        """Covariance of x, y, z in each hold, shape (h, s, 3, 3)."""
+        holds, sections, _ = self.values.shape
+        blocks = [
+            [self.covariance[h, s, :3, h, s, :3] for s in range(sections)] for h in range(holds)
+        ]
+        return np.array(blocks)
+
     def deflection_covariance(self, reference: int = 0) -> Floats:
         """Covariance of x, y, z minus those of the reference hold, shape (h, s, 3, 3)."""
         holds, sections, _ = self.values.shape
@@ -84,14 +92,21 @@ class Uncertainty:
 
 def over_time(
     covariance: HoldCovariance,
+    deflection: Floats,
     solved: Solved,
     expected: Expected,
     followed: Followed,
     times_ns: NDArray[np.int64],
     deflection_m: Floats,
 ) -> Uncertainty:
-    """Carry the holds' uncertainty to all moments; between holds that of both, and the noise."""
-    position, deflection = covariance.position_variance(), covariance.deflection_covariance()
+    """Carry the holds' uncertainty to all moments; between holds that of both, and the noise.
+
+    Parameters
+    ----------
+    deflection
+        Covariance of the deflection in each hold, shape (h, s, 3, 3).
+    """
+    position = covariance.position_variance()
     low, high, share = _between(np.array(solved.shares), expected.at(times_ns))
     inside = followed.in_hold >= 0
     low[inside] = high[inside] = followed.in_hold[inside]

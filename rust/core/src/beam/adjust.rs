@@ -30,6 +30,8 @@ pub const EDGE_RAD: f64 = 1e-3;
 /// The same of one hold, lidar and side against all, rad.
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
 
+/// A stress-free curvature known no better than this has to be found with the loads, rad/m.
+const VAGUE_RAD_M: f64 = 1e-4;
 /// Data are taken for no better than this share of the gate while the gate is wide.
 const COARSE: f64 = 0.1;
 
@@ -383,8 +385,10 @@ impl Adjustment {
                 .nth(unknown - self.layout.shared)
                 .map(|own| own.kind)
         };
+        let is_vague = self.problem.trust.free_rad_m > VAGUE_RAD_M;
         match kind {
             Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
+            Some(Kind::Free { mode: 0 | 1, .. }) if is_vague => Stage::Loads,
             _ => Stage::Blade,
         }
     }

@@ -80,14 +80,14 @@ mod tests {
     use super::*;
 
     fn bent(scale: f64) -> (Vec<f64>, Vec<Vector3<f64>>) {
-        let s_m: Vec<f64> = (0..=60).map(|i| f64::from(i)).collect();
+        let s_m: Vec<f64> = (0..=60).map(f64::from).collect();
         let bend = |i: i32| Vector3::new(0.004, 0.01 * f64::from(i) / 60.0, 0.002) * scale;
         (s_m, (0..60).map(bend).collect())
     }
 
     #[test]
     fn a_constant_curvature_is_a_circle_of_the_right_length() {
-        let s_m: Vec<f64> = (0..=100).map(|i| f64::from(i)).collect();
+        let s_m: Vec<f64> = (0..=100).map(f64::from).collect();
         let bend = vec![Vector3::y() * 0.01; 100];
         let axis = Axis::integrate(&Matrix3::identity(), &s_m, bend);
         let end = Vector3::new(100.0 * (1.0 - 1f64.cos()), 0.0, 100.0 * 1f64.sin());

@@ -42,14 +42,14 @@ pub struct Tally {
     /// Echoes whose rays miss the blade.
     pub missed: usize,
     /// Echoes beyond the gate.
-    pub rejected: usize,
+    pub rejected: Vec<Used>,
     /// Echoes at grazing angles or ends of runs.
     pub unfit: usize,
     /// Edges that were soft, missed the blade, or lay beyond the gate.
     pub edges_left_out: [usize; 3],
 }
 
-/// An echo that counted.
+/// An echo that met the model, whether it counted or not.
 #[derive(Debug, Clone, Copy)]
 pub struct Used {
     /// Instant, nanoseconds.
@@ -156,18 +156,19 @@ impl<'a> Rows<'a> {
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
         let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
-        if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
-            self.tally.rejected += 1;
-            return arc_m;
-        }
-        self.tally.used.push(Used {
+        let met = Used {
             time_ns: echo.time_ns,
             lidar: echo.lidar,
             ring: echo.ring,
             s_m: self.arc_m(&hit.contact),
             residual_m: residual,
             point: lidar.origin + direction * (hit.range_m + residual),
-        });
+        };
+        if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
+            self.tally.rejected.push(met);
+            return arc_m;
+        }
+        self.tally.used.push(met);
         let weight = robust(residual, sigma, self.gates.echo_m) / (sigma * sigma);
         self.normal.add(&mut row, residual, weight);
         arc_m

@@ -3,7 +3,7 @@
 use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem, Stage};
 use lidar_deflect_core::beam::family::{Loading, Trust};
 use lidar_deflect_core::beam::rig::Rig;
-use lidar_deflect_core::beam::rows::{Tally, Weights};
+use lidar_deflect_core::beam::rows::{Tally, Used, Weights};
 use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
 use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
 use lidar_deflect_core::error::InvalidValue;
@@ -296,27 +296,28 @@ impl BeamAdjustment {
 }
 
 fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
-    let told = PyDict::new(py);
-    let used = &tally.used;
-    told.set_item("time_ns", column(py, used.iter().map(|u| u.time_ns)))?;
-    told.set_item("lidar", column(py, used.iter().map(|u| u.lidar as u32)))?;
-    told.set_item("ring", column(py, used.iter().map(|u| u.ring as u32)))?;
-    told.set_item("s_m", column(py, used.iter().map(|u| u.s_m)))?;
-    told.set_item("residual_m", column(py, used.iter().map(|u| u.residual_m)))?;
-    told.set_item(
-        "xyz_m",
-        arrays::rows(
-            py,
-            used.iter()
-                .map(|u| u.point.into())
-                .collect::<Vec<[f64; 3]>>(),
-        )?,
-    )?;
+    let told = met(py, &tally.used)?;
     told.set_item("edges", tally.edges.clone())?;
     told.set_item("missed", tally.missed)?;
-    told.set_item("rejected", tally.rejected)?;
+    told.set_item("rejected", met(py, &tally.rejected)?)?;
     told.set_item("unfit", tally.unfit)?;
     told.set_item("edges_left_out", tally.edges_left_out)?;
+    Ok(told)
+}
+
+/// Columns of echoes that met the model.
+fn met<'py>(py: Python<'py>, echoes: &[Used]) -> PyResult<Bound<'py, PyDict>> {
+    let told = PyDict::new(py);
+    told.set_item("time_ns", column(py, echoes.iter().map(|e| e.time_ns)))?;
+    told.set_item("lidar", column(py, echoes.iter().map(|e| e.lidar as u32)))?;
+    told.set_item("ring", column(py, echoes.iter().map(|e| e.ring as u32)))?;
+    told.set_item("s_m", column(py, echoes.iter().map(|e| e.s_m)))?;
+    told.set_item(
+        "residual_m",
+        column(py, echoes.iter().map(|e| e.residual_m)),
+    )?;
+    let points: Vec<[f64; 3]> = echoes.iter().map(|e| e.point.into()).collect();
+    told.set_item("xyz_m", arrays::rows(py, points)?)?;
     Ok(told)
 }
 
