@@ -193,3 +193,31 @@ def test_a_broken_workbook_is_an_error_with_its_name(tmp_path: Path) -> None:
     path.write_bytes(b"PK\x03\x04" + bytes(100))
     with pytest.raises(ConfigError, match=r"channel\.xlsx"):
         delimited.read(path)
+
+
+def test_other_instruments_reach_tables_and_report(tmp_path: Path) -> None:
+    """A strain gauge and an inclinometer of the root, from one TDMS file and a CSV."""
+    from lidar_deflect import config as configs
+    from lidar_deflect import instruments
+    from lidar_deflect.folder import Folder
+    from lidar_deflect.plots import Plots
+
+    tdms(tmp_path)
+    (tmp_path / "test.toml").write_text(
+        '[blade]\nlength_m = 110.0\n[[lidars]]\nid = "L1"\n'
+        '[[channels]]\nname = "strain-30"\nfile = "channel.tdms"\ntime = "time"\n'
+        'column = "load_percent"\nunit = "um/m"\nshift_s = 0.5\n'
+        '[[channels]]\nname = "hall"\nfile = "channel.tdms"\ntime = "time"\n'
+        'column = "temperature"\nunit = "°C"\n'
+    )
+    strain, hall = instruments.others(configs.load(tmp_path / "test.toml"))
+    assert strain.time_ns[0] == START_NS + 500_000_000
+    assert (strain.unit, hall.unit) == ("um/m", "°C")
+    assert hall.value.size == 24
+    import folders
+
+    table = channels.to_table([strain, hall], START_NS)
+    folder = folders.write(tmp_path / "results", channels=table)
+    figure = Plots(Folder(folder)).channels()
+    assert [trace.name for trace in figure.data] == ["strain-30", "hall"]
+    assert figure.layout.yaxis2.title.text == "reading (°C)"

@@ -165,6 +165,21 @@ def test_shapes_are_drawn_from_the_blade_line_where_there_is_one() -> None:
     assert len(Plots(own).deflected_shapes().data[0].x) == 50
 
 
+def test_rotations_that_a_method_did_not_write_are_those_of_its_line() -> None:
+    import beam_folders
+    from lidar_deflect.plots import spans
+
+    frame = beam_folders.deflection()
+    steps = folders.step_table(frame)
+    line = beam_folders.contour(frame)
+    bare = line.with_columns(rx_rad=pl.lit(None, pl.Float64), ry_rad=pl.lit(None, pl.Float64))
+    found = spans.sloped(bare, steps).sort("time", "s_m")
+    true = line.sort("time", "s_m")["ry_rad"].to_numpy()
+    # the line bends by 0.11 rad at most; differences of stations 2 m apart are good to 0.5 mrad
+    assert np.max(np.abs(found["ry_rad"].to_numpy() - true)) < 1.5e-3
+    assert spans.sloped(line, steps) is line
+
+
 def test_health_shows_loss_in_percent_of_what_was_due() -> None:
     figure = Plots(result()).health()
     lost = trace(figure, "L2")
@@ -185,6 +200,7 @@ def test_the_plan_shows_lidars_and_anchors_where_they_are_known() -> None:
 DRAWN = (
     "time_series",
     "wires",
+    "channels",
     "load_deflection",
     "creep",
     "deflected_shapes",

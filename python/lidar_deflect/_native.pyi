@@ -20,9 +20,11 @@ __all__ = [
     "FramePlan",
     "PointIterator",
     "Simulation",
+    "StaticHold",
     "Sweep",
     "SweepIterator",
     "__version__",
+    "adjust_network",
     "arc_length",
     "beam_seen",
     "check_captures",
@@ -404,6 +406,7 @@ def beam_seen(
     windows_ns: Sequence[tuple[int, int]],
     progress: Callable[[int, int], None] | None = None,
 ) -> list[BeamSeen]: ...
+
 @final
 class BeamAdjustment:
     def __new__(
@@ -449,3 +452,47 @@ class BeamAdjustment:
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]] | None]: ...
     def values(self) -> NDArray[np.float64]: ...
     def layout(self) -> dict[str, int]: ...
+
+class StaticHold:
+    """What one lidar sees while nothing moves: mean rays per channel and azimuth cell."""
+
+    @staticmethod
+    def add_up(
+        xyz: NDArray[np.float32],
+        ring: NDArray[np.uint16],
+        azimuth_deg: NDArray[np.float32],
+        intensity: NDArray[np.float32] | None,
+        *,
+        step_deg: float,
+        min_count: int,
+    ) -> StaticHold: ...
+    @staticmethod
+    def of_rays(
+        direction: NDArray[np.float64],
+        range_m: NDArray[np.float64],
+        sigma_m: NDArray[np.float64],
+        ring: NDArray[np.uint16],
+        cell: NDArray[np.uint32],
+        intensity: NDArray[np.float32],
+        *,
+        cells: int,
+    ) -> StaticHold: ...
+    def beams(self) -> dict[str, NDArray[Any]]: ...
+    @property
+    def cells(self) -> int: ...
+    @property
+    def dropped(self) -> tuple[int, int]: ...
+    def ground(
+        self, up_in_sensor: NDArray[np.float64]
+    ) -> tuple[tuple[float, float, float], float] | None: ...
+    def __len__(self) -> int: ...
+
+def adjust_network(
+    holds: Sequence[StaticHold],
+    lidars: Sequence[Mapping[str, Any]],
+    surfaces: Sequence[Mapping[str, Any]],
+    targets: Sequence[Sequence[float]],
+    known: Mapping[str, Any],
+    *,
+    priors: Sequence[float],
+) -> dict[str, Any]: ...

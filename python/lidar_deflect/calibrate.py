@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lidar_deflect import judgement, network
 from lidar_deflect.calibration import Calibration, Pose
 from lidar_deflect.errors import CalibrationError, ConfigError
 from lidar_deflect.registration import Registered, Wall, register, surveyed_plane
@@ -24,16 +26,33 @@ NO_WALL = (
 )
 
 
+NO_DATUM = (
+    "fewer than three surveyed points on the ground, so the lidars are registered one by one "
+    '(closed_form): list [[control]] points with on = "ground" for the network adjustment'
+)
+
+
 def calibrate(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
-    """Register every lidar that is in the clouds, steps 1 to 4 of the paper.
+    """Register every lidar that is in the clouds, as `[calibrate] method` says.
 
     Raises
     ------
     ConfigError
         If a lidar has neither a surveyed position nor a pose from elsewhere.
     CalibrationError
-        If ground or wall of a lidar cannot be found; the error names it.
+        If ground or wall of a lidar cannot be found, or a direction of a pose is left free; the
+        error names it.
     """
+    if config.calibrate.method == "closed_form":
+        return closed_form(config, clouds)
+    if not network.can_solve(config):
+        alone = closed_form(config, clouds)
+        return replace(alone, warnings=(NO_DATUM, *alone.warnings))
+    return judgement.calibration(config, network.solve(config, clouds))
+
+
+def closed_form(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
+    """Register every lidar by itself, steps 1 to 4 of the paper."""
     wall = _surveyed_wall(config)
     poses = tuple(_pose(config, config.lidar(id), cloud, wall) for id, cloud in clouds.items())
     warnings = () if wall is not None else (NO_WALL,)

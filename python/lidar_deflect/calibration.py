@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import tomlkit
 
 from lidar_deflect.errors import CalibrationError
-from lidar_deflect.files import write_text
+from lidar_deflect.files import whole_file, write_text
 from lidar_deflect.notebook import card
 
 if TYPE_CHECKING:
@@ -51,6 +51,77 @@ class Pose:
         return self.world_from_sensor[:3, 3]
 
 
+@dataclass(frozen=True)
+class Nuisances:
+    """What the adjustment found to be wrong with one lidar.
+
+    Attributes
+    ----------
+    channel_offset_m
+        By ring, shape (channels,): measured range plus offset is the true range.
+    elevation_offset_rad
+        Added to every nominal elevation.
+    range_scale
+        True range is larger than the measured one by this share.
+    """
+
+    channel_offset_m: NDArray[np.float64]
+    elevation_offset_rad: float = 0.0
+    range_scale: float = 0.0
+
+
+@dataclass(frozen=True, repr=False)
+class Joint:
+    """Poses of all lidars as one estimate; saved as `calibration.npz`.
+
+    Attributes
+    ----------
+    lidars
+        Ids, in the order of the covariances.
+    covariance
+        Shape (6 n, 6 n), each lidar wx wy wz tx ty tz as in `Pose.covariance`.
+    nuisances
+        By lidar.
+    full_covariance
+        Per lidar: the pose's six, elevation offset, range scale, then every channel's offset.
+    """
+
+    lidars: tuple[str, ...]
+    covariance: NDArray[np.float64]
+    nuisances: tuple[Nuisances, ...]
+    full_covariance: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        return f"Joint({', '.join(self.lidars)}; {len(self.full_covariance)} unknowns)"
+
+    def save(self, path: Path) -> None:
+        """Write `calibration.npz`, under a temporary name first."""
+        columns: dict[str, Any] = {
+            "lidars": np.array(self.lidars),
+            "covariance": self.covariance,
+            "full_covariance": self.full_covariance,
+            "elevation_offset_rad": np.array([n.elevation_offset_rad for n in self.nuisances]),
+            "range_scale": np.array([n.range_scale for n in self.nuisances]),
+        }
+        for id, own in zip(self.lidars, self.nuisances, strict=True):
+            columns[f"channel_offset_m:{id}"] = own.channel_offset_m
+        with whole_file(path, overwrite=True) as temporary, temporary.open("wb") as file:
+            np.savez(file, **columns)
+
+    @classmethod
+    def load(cls, path: Path) -> Joint:
+        """Read `calibration.npz`."""
+        with np.load(path) as file:
+            lidars = tuple(str(id) for id in file["lidars"])
+            nuisances = tuple(
+                Nuisances(file[f"channel_offset_m:{id}"], float(elevation), float(scale))
+                for id, elevation, scale in zip(
+                    lidars, file["elevation_offset_rad"], file["range_scale"], strict=True
+                )
+            )
+            return cls(lidars, file["covariance"], nuisances, file["full_covariance"])
+
+
 @dataclass(frozen=True, repr=False)
 class Calibration:
     """Poses of all lidars, how they were found, and the unloaded blade where it was seen.
@@ -60,18 +131,24 @@ class Calibration:
     poses
         One per lidar.
     method
-        ``closed_form`` (steps 1-4 of the paper).
+        ``network`` (one adjustment), or ``closed_form`` (steps 1-4 of the paper).
     warnings
         What a user should know before trusting it.
     reference
         State of the unloaded blade by measuring method, so that a run without an unloaded hold can
         be measured; empty where none was seen.
+    joint
+        Poses and nuisances of all lidars with their joint covariance; None where the method has none.
+    evidence
+        What the adjustment as a whole rests on: verdict, surfaces, survey with residuals.
     """
 
     poses: tuple[Pose, ...]
     method: str
     warnings: tuple[str, ...] = ()
     reference: Mapping[str, Any] = field(default_factory=dict)
+    joint: Joint | None = None
+    evidence: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         names = ", ".join(pose.id for pose in self.poses)
@@ -121,12 +198,16 @@ class Calibration:
             "schema": SCHEMA,
             "method": self.method,
             "warnings": list(self.warnings),
+            "evidence": _plain(dict(self.evidence)),
             "lidars": [_pose_to_dict(pose) for pose in self.poses],
         } | ({"reference": _plain(dict(self.reference))} if self.reference else {})
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
-        """Write `calibration.toml`, under a temporary name first."""
-        return write_text(Path(path), tomlkit.dumps(self.to_dict()), overwrite=overwrite)
+        """Write `calibration.toml` and, beside it, the joint covariance as `.npz`."""
+        path = write_text(Path(path), tomlkit.dumps(self.to_dict()), overwrite=overwrite)
+        if self.joint is not None:
+            self.joint.save(path.with_suffix(".npz"))
+        return path
 
     @classmethod
     def load(cls, path: str | Path) -> Calibration:
@@ -143,6 +224,9 @@ class Calibration:
             if document["schema"] != SCHEMA:
                 raise KeyError("schema")
             poses = tuple(_pose_from_dict(entry) for entry in document["lidars"])
+            beside = path.with_suffix(".npz")
+            is_joint = document.get("method") == "network" and beside.is_file()
+            joint = Joint.load(beside) if is_joint else None
         except (OSError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError) as error:
             raise CalibrationError(
                 f"{path} is no calibration",
@@ -155,6 +239,8 @@ class Calibration:
             str(document.get("method", "unknown")),
             tuple(document.get("warnings", ())),
             document.get("reference", {}),
+            joint,
+            document.get("evidence", {}),
         )
 
 
@@ -217,9 +303,5 @@ def with_reference(
     calibration: Calibration, method: str, reference: Mapping[str, Any]
 ) -> Calibration:
     """Return the calibration with the unloaded state of the blade under one more method."""
-    return Calibration(
-        calibration.poses,
-        calibration.method,
-        calibration.warnings,
-        {**calibration.reference, method: _plain(dict(reference))},
-    )
+    kept = {**calibration.reference, method: _plain(dict(reference))}
+    return replace(calibration, reference=kept)

@@ -33,7 +33,7 @@ class Channel:
     value
         Readings, shape (n,), NaN where there is none.
     unit
-        ``percent``, ``m`` or ``rad``.
+        ``percent``, ``m`` or ``rad``; of other instruments as configured.
     """
 
     name: str
@@ -155,6 +155,21 @@ def read_root(
         for name, column in named.items()
         if column is not None
     )
+
+
+def read_other(
+    path: str | Path,
+    *,
+    name: str,
+    column: str,
+    time: str = "time_utc_s",
+    unit: str = "",
+    near_ns: int | None = None,
+) -> Channel:
+    """Read any other instrument as it is; its unit is only shown."""
+    frame = delimited.read(path, [column, time])
+    values = delimited.numbers(frame, column, path)
+    return Channel(name, delimited.instants(frame, time, path, near_ns), values, unit)
 
 
 Quantity = Literal["total", "direction", "vector"]

@@ -71,13 +71,30 @@ def root(
     return tuple(each.shifted(_shift(given.shift_s, given.file, shifts)) for each in found)
 
 
+def others(
+    config: Config, near_ns: int | None = None, shifts: Shifts = NO_SHIFTS
+) -> tuple[Channel, ...]:
+    """Read the other instruments, each in its own unit."""
+    return tuple(
+        channels.read_other(
+            given.file,
+            name=given.name,
+            column=given.column,
+            time=given.time,
+            unit=given.unit,
+            near_ns=near_ns,
+        ).shifted(_shift(given.shift_s, given.file, shifts))
+        for given in config.channels
+    )
+
+
 def _shift(configured: float | None, file: Path, shifts: Shifts) -> float:
     return configured if configured is not None else shifts.get(file, 0.0)
 
 
 def unsettled_files(config: Config) -> dict[Path, None]:
     """Files of channels whose clock the configuration leaves to the data, the load's first."""
-    given = [config.load, *config.wires, config.root]
+    given = [config.load, *config.wires, config.root, *config.channels]
     return {
         each.file: None
         for each in given

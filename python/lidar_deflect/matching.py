@@ -101,7 +101,8 @@ def _of(opened: OpenedTest, file: Path) -> list[Channel]:
     found += [each for each in instruments.wires(config, near) if each.name in named]
     if config.root is not None and config.root.file == file:
         found += instruments.root(config, near)
-    return found
+    other = {each.name for each in config.channels if each.file == file}
+    return found + [each for each in instruments.others(config, near) if each.name in other]
 
 
 class _Motion:

@@ -226,7 +226,8 @@ def result_of(
     deflection = tabulate.deflection(states, holds, load=opened.load, root=root, first_ns=first_ns)
     health = health_table(opened.capture, inputs.lidars, states)
     settings = opened.config.model_dump()
-    given = [*([opened.load] if opened.load else []), *wires, *root]
+    others = instruments.others(opened.config, first_ns, opened.shifts)
+    given = [*([opened.load] if opened.load else []), *wires, *root, *others]
     given += wire_lines.predicted(deflection, settings)
     averages = steps.average(deflection, holds)
     frames = {

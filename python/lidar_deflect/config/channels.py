@@ -49,6 +49,20 @@ class Wire(Model):
         return self
 
 
+class OtherChannel(Model):
+    """Any other instrument (strain, inclinometer, wind): kept and shown beside the deflection."""
+
+    name: Name = Field(description="name of the channel in tables and figures")
+    file: FilePath = Field(description="channel file")
+    time: Column = Field(default="time_utc_s", description="column of the time, UTC")
+    column: Column = Field(description="column of the reading")
+    unit: str = Field(default="", description="its unit, as it is to be shown")
+    shift_s: Number | None = Field(
+        default=None,
+        description="seconds to add to the file's times; default: estimated where clocks differ",
+    )
+
+
 class Root(Model):
     """Measured rotation of root or stand: right-hand about the world axes, zero at reference."""
 

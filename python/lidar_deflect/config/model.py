@@ -8,7 +8,7 @@ from pydantic_core import PydanticCustomError
 
 from lidar_deflect.config.base import Model, problem, split_source
 from lidar_deflect.config.blade import Blade, Section, TestInfo
-from lidar_deflect.config.channels import Load, Prediction, Reference, Root, Wire
+from lidar_deflect.config.channels import Load, OtherChannel, Prediction, Reference, Root, Wire
 from lidar_deflect.config.lidars import Lidar
 from lidar_deflect.config.measure import Gates, Measure, Paper
 from lidar_deflect.config.survey import Calibrate, ControlPoint, Distance, Target
@@ -26,6 +26,9 @@ class Config(Model):
     calibrate: Calibrate = Field(default=Calibrate(), description="priors for the calibration")
     sections: tuple[Section, ...] = Field(default=(), description="the wanted sections")
     wires: tuple[Wire, ...] = Field(default=(), description="draw wires, real and virtual")
+    channels: tuple[OtherChannel, ...] = Field(
+        default=(), description="any other instruments, shown beside the deflection"
+    )
     root: Root | None = Field(default=None, description="measured rotation of the root")
     reference: Reference = Field(default=Reference(), description="the unloaded hold")
     load: Load = Field(default=Load(), description="load channel, direction and saddles")
@@ -54,6 +57,7 @@ def _contradictions(config: Config) -> Iterator[PydanticCustomError]:
     yield from _doubles("sections", "name", [section.name for section in config.sections])
     yield from _doubles("targets", "name", [target.name for target in config.targets])
     yield from _doubles("wires", "name", [wire.name for wire in config.wires])
+    yield from _doubles("channels", "name", [channel.name for channel in config.channels])
     yield from _sources(config)
     yield from _lengths(config)
     yield from _references(config)

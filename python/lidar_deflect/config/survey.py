@@ -36,8 +36,12 @@ class Distance(Model):
 
 
 class Calibrate(Model):
-    """Priors of what may be wrong with a lidar, for the calibration."""
+    """How the lidars are registered, and priors of what may be wrong with one."""
 
+    method: Literal["network", "closed_form"] = Field(
+        default="network",
+        description="network (one adjustment of everything known) | closed_form (paper, steps 1-4)",
+    )
     channel_offset_u_m: NotNegative = Field(
         default=0.02, description="prior sigma of each channel's range offset"
     )

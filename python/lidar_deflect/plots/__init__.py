@@ -62,6 +62,10 @@ class Plots:
         """Draw every draw wire beside what it would have read at the measured positions."""
         return series.wires(self._result)
 
+    def channels(self) -> go.Figure:
+        """Draw the channels that are neither load nor wire, one panel per unit."""
+        return series.channels(self._result)
+
     def load_deflection(self) -> go.Figure:
         """Draw the deflection along the load over the load: holds, lines through them, paths."""
         return load.load_deflection(self._result)

@@ -3,7 +3,7 @@
 import plotly.graph_objects as go
 import polars as pl
 
-from lidar_deflect import behaviour
+from lidar_deflect import behaviour, words
 from lidar_deflect.plots import style
 from lidar_deflect.plots.source import HasTables, configuration, sections, some
 
@@ -17,14 +17,14 @@ def load_deflection(result: HasTables) -> go.Figure:
     unit = behaviour.direction(configuration(result), result.steps)
     frame = result.deflection.filter(pl.col("load").is_not_null(), pl.col("d_m").is_not_null())
     if unit is None or frame.is_empty():
-        return style.note(figure, "no load channel was read")
+        return style.note(figure, words.PLOT["no_load_channel_was_read"])
     frame, steps = behaviour.along(frame, unit), behaviour.along(result.steps, unit)
     lines = behaviour.by_section(behaviour.stiffnesses(result.steps, result.deflection, unit))
     for k, (name, s_m) in enumerate(some(sections(frame), _MOST_SECTIONS)):
         _add_section(figure, frame, steps, lines.get(name), (name, s_m, k))
-    figure.update_yaxes(title_text="deflection along the load (m)", row=1, col=1)
-    figure.update_yaxes(title_text="from the line (mm)", row=2, col=1)
-    figure.update_xaxes(title_text="load (%)", row=2, col=1)
+    figure.update_yaxes(title_text=words.PLOT["deflection_along_the_load"], row=1, col=1)
+    figure.update_yaxes(title_text=words.PLOT["from_the_line"], row=2, col=1)
+    figure.update_xaxes(title_text=words.PLOT["load"], row=2, col=1)
     figure.update_layout(height=620)
     return figure
 
@@ -105,7 +105,7 @@ def creep(result: HasTables, section: str | None = None) -> go.Figure:
     unit = behaviour.direction(configuration(result), result.steps)
     known = sections(result.steps.filter(pl.col("d_m").is_not_null()))
     if unit is None or not known:
-        return style.note(figure, "no hold was measured")
+        return style.note(figure, words.PLOT["no_hold_was_measured"])
     name = section if section is not None else known[-1][0]
     states = behaviour.along(result.deflection, unit).filter(
         pl.col("section") == name, pl.col("along_m").is_not_null()
@@ -116,9 +116,9 @@ def creep(result: HasTables, section: str | None = None) -> go.Figure:
         if part.height:
             figure.add_trace(_drift(part, row["step"], k))
     if not figure.data:
-        return style.note(figure, "no hold was measured")
-    figure.update_xaxes(title_text="time in the hold (s)")
-    figure.update_yaxes(title_text="along the load, from the hold's mean (mm)")
+        return style.note(figure, words.PLOT["no_hold_was_measured"])
+    figure.update_xaxes(title_text=words.PLOT["time_in_the_hold"])
+    figure.update_yaxes(title_text=words.PLOT["along_the_load_from_the_hold_s_mea"])
     figure.update_layout(height=380, meta={"section": name})
     return figure
 

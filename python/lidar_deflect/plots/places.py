@@ -7,6 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.plots import style
 from lidar_deflect.plots.source import HasTables, configuration, poses_of, sections, some, table
 
@@ -33,13 +34,17 @@ def plan(result: HasTables) -> go.Figure:
         )
     config = configuration(result)
     lidars = [(name, at[2], at[0]) for name, at in lidar_places(result).items()]
-    _add_places(figure, "lidar", "square", lidars)
-    _add_places(figure, "wire anchor", "x", _places(config.get("wires"), "name", "anchor_m"))
+    _add_places(figure, words.PLOT["lidar"], "square", lidars)
+    _add_places(
+        figure, words.PLOT["wire_anchor"], "x", _places(config.get("wires"), "name", "anchor_m")
+    )
     _add_control(figure, config)
     if not figure.data:
-        return style.note(figure, "nothing has a place")
-    figure.update_xaxes(title_text="z, along the blade (m)", constrain="domain")
-    figure.update_yaxes(title_text="x (m)", scaleanchor="x", scaleratio=1, constrain="domain")
+        return style.note(figure, words.PLOT["nothing_has_a_place"])
+    figure.update_xaxes(title_text=words.PLOT["z_along_the_blade"], constrain="domain")
+    figure.update_yaxes(
+        title_text=words.PLOT["x"], scaleanchor="x", scaleratio=1, constrain="domain"
+    )
     figure.update_layout(height=560)
     return figure
 
@@ -96,15 +101,15 @@ def _add_control(figure: go.Figure, config: Mapping[str, Any]) -> None:
                 x=z,
                 y=x,
                 mode="markers",
-                name="surveyed point",
+                name=words.PLOT["surveyed_point"],
                 marker={"symbol": "cross-thin-open", "size": 7, "color": style.GREY},
-                hovertemplate="z %{x:.2f} m<br>x %{y:.2f} m<extra>surveyed point</extra>",
+                hovertemplate="z %{x:.2f} m<br>x %{y:.2f} m<extra>%{fullData.name}</extra>",
             )
         )
 
 
-_TURNS = ("turn about x", "turn about y", "turn about z")
-_SHIFTS = ("shift along x", "shift along y", "shift along z")
+_TURNS = (words.PLOT["turn_about_x"], words.PLOT["turn_about_y"], words.PLOT["turn_about_z"])
+_SHIFTS = (words.PLOT["shift_along_x"], words.PLOT["shift_along_y"], words.PLOT["shift_along_z"])
 
 
 def pose_uncertainty(result: HasTables) -> go.Figure:
@@ -112,11 +117,11 @@ def pose_uncertainty(result: HasTables) -> go.Figure:
     figure = style.panels(2)
     known = [entry for entry in poses_of(result) if entry.get("covariance")]
     if not known:
-        return style.note(figure, "this calibration states no covariance")
+        return style.note(figure, words.PLOT["this_calibration_states_no_covaria"])
     names = [style.text(entry["id"]) for entry in known]
     sigma = np.array([_sigmas(entry["covariance"]) for entry in known])
-    for row, words in enumerate((_TURNS, _SHIFTS)):
-        for k, word in enumerate(words):
+    for row, labels in enumerate((_TURNS, _SHIFTS)):
+        for k, word in enumerate(labels):
             figure.add_trace(
                 go.Bar(
                     x=names,
@@ -128,9 +133,9 @@ def pose_uncertainty(result: HasTables) -> go.Figure:
                 row=row + 1,
                 col=1,
             )
-    figure.update_yaxes(title_text="turn, k = 2 (mrad)", rangemode="tozero", row=1, col=1)
-    figure.update_yaxes(title_text="shift, k = 2 (mm)", rangemode="tozero", row=2, col=1)
-    figure.update_xaxes(title_text="lidar", type="category", showgrid=False)
+    figure.update_yaxes(title_text=words.PLOT["turn_k_2"], rangemode="tozero", row=1, col=1)
+    figure.update_yaxes(title_text=words.PLOT["shift_k_2"], rangemode="tozero", row=2, col=1)
+    figure.update_xaxes(title_text=words.PLOT["lidar"], type="category", showgrid=False)
     figure.update_layout(barmode="group", height=480)
     return figure
 
@@ -145,14 +150,14 @@ def drift(result: HasTables) -> go.Figure:
     figure = style.panels(2, shared_xaxes=True)
     poses = table(result, "poses").sort("time")
     if poses.is_empty():
-        return style.note(figure, "no pose was watched")
+        return style.note(figure, words.PLOT["no_pose_was_watched"])
     for k, lidar in enumerate(poses["lidar"].unique().sort()):
         part = poses.filter(pl.col("lidar") == lidar)
         for row, (kind, unit) in enumerate((("r", "mrad"), ("t", "mm")), start=1):
             figure.add_trace(_drift_line(part, kind, unit, k, first=row == 1), row=row, col=1)
-    figure.update_yaxes(title_text="turn (mrad)", row=1, col=1)
-    figure.update_yaxes(title_text="shift (mm)", row=2, col=1)
-    figure.update_xaxes(title_text="time (s)", row=2, col=1)
+    figure.update_yaxes(title_text=words.PLOT["turn"], row=1, col=1)
+    figure.update_yaxes(title_text=words.PLOT["shift"], row=2, col=1)
+    figure.update_xaxes(title_text=words.PLOT["time"], row=2, col=1)
     figure.update_layout(height=440)
     return figure
 

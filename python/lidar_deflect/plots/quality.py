@@ -1,9 +1,12 @@
 """Figures of how well it went: errors by method (the paper's figure 20), health of the lidars."""
 
+from typing import Any
+
 import plotly.graph_objects as go
 import polars as pl
 
 from lidar_deflect import comparison as held_against
+from lidar_deflect import words
 from lidar_deflect.plots import style
 from lidar_deflect.plots.source import HasTables, table
 
@@ -17,7 +20,7 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
     frame = table(result, "comparison")
     bars = _bars(frame, step or held_against.largest_step(frame))
     if bars.is_empty():
-        return style.note(figure, "nothing was compared")
+        return style.note(figure, words.PLOT["nothing_was_compared"])
     for k, name in enumerate(bars["name"].unique(maintain_order=True)):
         rows = bars.filter(pl.col("name") == name)
         figure.add_trace(
@@ -26,7 +29,7 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
                 y=rows["error_percent"],
                 name=style.text(name),
                 marker={"color": style.colour(k), "pattern": {"shape": ["", "/", ".", "x"][k % 4]}},
-                error_y={"type": "data", "array": rows["interval_percent"].fill_null(0.0)},
+                error_y=_intervals(rows["interval_percent"]),
                 text=[f"{value:z.2f}" for value in rows["error_percent"]],
                 textposition="outside",
                 cliponaxis=False,
@@ -36,11 +39,18 @@ def comparison(result: HasTables, step: str | None = None) -> go.Figure:
     order = [
         style.text(section) for section in bars.sort("s_m")["section"].unique(maintain_order=True)
     ]
-    figure.update_xaxes(title_text="section", type="category", showgrid=False)
+    figure.update_xaxes(title_text=words.PLOT["section"], type="category", showgrid=False)
     figure.update_xaxes(categoryorder="array", categoryarray=order)
-    figure.update_yaxes(title_text="error (%)")
+    figure.update_yaxes(title_text=words.PLOT["error"])
     figure.update_layout(barmode="group", height=440)
     return figure
+
+
+def _intervals(half: pl.Series) -> dict[str, Any] | None:
+    """Error bars, none where no method states an uncertainty."""
+    if half.null_count() == len(half):
+        return None
+    return {"type": "data", "array": half.fill_null(0.0)}
 
 
 def _bars(frame: pl.DataFrame, step: str | None) -> pl.DataFrame:
@@ -61,10 +71,10 @@ def _bars(frame: pl.DataFrame, step: str | None) -> pl.DataFrame:
 
 def health(result: HasTables) -> go.Figure:
     """Draw loss, points on the blade, coverage and clock, per lidar and second."""
-    figure = style.panels(4, shared_xaxes=True)
+    figure = style.panels(5, shared_xaxes=True)
     frame = table(result, "health").sort("t_s")
     if frame.is_empty():
-        return style.note(figure, "no health was written")
+        return style.note(figure, words.PLOT["no_health_was_written"])
     counted = frame["blade_points"].null_count() < frame.height
     due = pl.col("packets").cast(pl.Int64) + pl.col("lost").cast(pl.Int64)
     frame = frame.with_columns(
@@ -73,10 +83,13 @@ def health(result: HasTables) -> go.Figure:
         clock_ms=1e3 * pl.col("clock_offset_s"),
     )
     panels = (
-        ("lost_percent", "lost (%)"),
-        ("blade_points", "blade points (1/s)") if counted else ("points", "points (1/s)"),
-        ("coverage_percent", "coverage (%)"),
-        ("clock_ms", "clock - UTC (ms)"),
+        ("lost_percent", words.PLOT["lost"]),
+        ("blade_points", words.PLOT["blade_points"])
+        if counted
+        else ("points", words.PLOT["points"]),
+        ("coverage_percent", words.PLOT["coverage"]),
+        ("rpm", words.PLOT["turns"]),
+        ("clock_ms", words.PLOT["clock_utc"]),
     )
     for k, lidar in enumerate(frame["lidar"].unique().sort()):
         part = frame.filter(pl.col("lidar") == lidar)
@@ -86,8 +99,8 @@ def health(result: HasTables) -> go.Figure:
         figure.update_yaxes(title_text=label, row=row, col=1)
     figure.update_yaxes(rangemode="tozero", row=1, col=1)
     figure.update_yaxes(rangemode="tozero", row=2, col=1)
-    figure.update_xaxes(title_text="time (s)", row=4, col=1)
-    figure.update_layout(height=680)
+    figure.update_xaxes(title_text=words.PLOT["time"], row=5, col=1)
+    figure.update_layout(height=780)
     return figure
 
 
@@ -110,7 +123,7 @@ def residuals(result: HasTables) -> go.Figure:
     figure = style.plain()
     points = table(result, "points").drop_nulls(["s_m", "residual_m"])
     if points.is_empty():
-        return style.note(figure, "this method keeps no residuals")
+        return style.note(figure, words.PLOT["this_method_keeps_no_residuals"])
     lidars = points["lidar"].unique().sort()
     for k, lidar in enumerate(lidars):
         part = points.filter(pl.col("lidar") == lidar).sort("s_m")
@@ -126,7 +139,7 @@ def residuals(result: HasTables) -> go.Figure:
                 hovertemplate="%{x:.1f} m<br>%{y:.1f} mm<extra>%{fullData.name}</extra>",
             )
         )
-    figure.update_xaxes(title_text="arc length s (m)")
-    figure.update_yaxes(title_text="measured - model (mm)")
+    figure.update_xaxes(title_text=words.PLOT["arc_length_s"])
+    figure.update_yaxes(title_text=words.PLOT["measured_model"])
     figure.update_layout(height=420)
     return figure

@@ -7,9 +7,10 @@ import plotly.graph_objects as go
 import polars as pl
 
 from lidar_deflect import wires as virtual
+from lidar_deflect import words
 from lidar_deflect.channels import from_table
 from lidar_deflect.plots import style
-from lidar_deflect.plots.source import HasTables, section_of, table
+from lidar_deflect.plots.source import HasTables, configuration, section_of, table
 
 Quantity = Literal["deflection", "position"]
 
@@ -40,7 +41,7 @@ def time_series(
         _marks(figure, frame, axis, row, quantity)
     _shade_holds(figure, result.steps)
     _shade_missing(figure, frame)
-    figure.update_xaxes(title_text="time (s)", row=3, col=1)
+    figure.update_xaxes(title_text=words.PLOT["time"], row=3, col=1)
     figure.update_layout(height=560, margin_t=64, meta={"section": name, "s_m": s_m})
     figure.update_layout(legend_y=1.04)  # above the labels of the holds
     return figure
@@ -84,7 +85,7 @@ def _band(figure: go.Figure, frame: pl.DataFrame, value: str, u: str, row: int, 
                 fillcolor=style.translucent(hue, 0.2),
                 line={"width": 0},
                 hoverinfo="skip",
-                name="95 %",
+                name=words.PLOT["95"],
                 legendgroup="95 %",
                 showlegend=row == 1 and k == 0,
             ),
@@ -180,7 +181,9 @@ def _shade_missing(figure: go.Figure, frame: pl.DataFrame) -> None:
     _shade(figure, spans[:_MOST_GAPS], style.translucent("#D55E00", 0.13))
     mark = {"symbol": "square", "size": 12, "color": style.translucent("#D55E00", 0.3)}
     figure.add_trace(
-        go.Scatter(x=[None], y=[None], mode="markers", name="missing", marker=mark), row=1, col=1
+        go.Scatter(x=[None], y=[None], mode="markers", name=words.PLOT["missing"], marker=mark),
+        row=1,
+        col=1,
     )
 
 
@@ -192,10 +195,10 @@ def wires(result: HasTables) -> go.Figure:
     rows = len(names) + bool(real)
     figure = style.panels(max(rows, 1), shared_xaxes=True)
     if not names:
-        return style.note(figure, "no draw wire, real or virtual, is in the tables")
+        return style.note(figure, words.PLOT["no_draw_wire_real_or_virtual_is_in"])
     for row, name in enumerate(names, start=1):
         for k, (channel, label) in enumerate(
-            ((name, "wire"), (name + virtual.SUFFIX, "by the lidars"))
+            ((name, words.PLOT["wire"]), (name + virtual.SUFFIX, words.PLOT["by_the_lidars"]))
         ):
             part = channels.filter(pl.col("channel") == channel).sort("time")
             if part.height:
@@ -204,8 +207,8 @@ def wires(result: HasTables) -> go.Figure:
     for k, name in enumerate(real):
         figure.add_trace(_difference(channels, name, k), row=rows, col=1)
     if real:
-        figure.update_yaxes(title_text="lidar - wire (mm)", row=rows, col=1)
-    figure.update_xaxes(title_text="time (s)", row=rows, col=1)
+        figure.update_yaxes(title_text=words.PLOT["lidar_wire"], row=rows, col=1)
+    figure.update_xaxes(title_text=words.PLOT["time"], row=rows, col=1)
     figure.update_layout(height=130 + 160 * rows)
     return figure
 
@@ -216,7 +219,7 @@ def _difference(channels: pl.DataFrame, name: str, k: int) -> go.Scatter:
     read = own["value"] if wire is None else pl.Series(wire.at(own["time"].cast(pl.Int64)))
     part = own.with_columns(value=1e3 * (own["value"] - read.fill_nan(None)))
     part = style.thinned(part, ["value"], MOST_STATES)
-    label = f"{style.text(name)}, difference"
+    label = f"{style.text(name)}, {words.PLOT['difference']}"
     return go.Scatter(
         x=part["t_s"],
         y=part["value"],
@@ -250,4 +253,50 @@ def _wire_line(part: pl.DataFrame, label: str, k: int, *, first: bool) -> go.Sca
         showlegend=first,
         connectgaps=False,
         hovertemplate="%{x:.2f} s<br>%{y:.4f} m<extra>" + label + "</extra>",
+    )
+
+
+def other_names(result: HasTables) -> list[str]:
+    """Name the channels that are neither load nor wire: root, strain, inclinometers."""
+    channels = table(result, "channels")
+    wired = set(wire_names(channels))
+    names = channels["channel"].unique(maintain_order=True).to_list()
+    drawn = {"load", *wired, *(name + virtual.SUFFIX for name in wired)}
+    config = configuration(result)
+    drawn |= {str(wire.get("name")) for wire in config.get("wires") or ()}
+    return [name for name in names if name not in drawn]
+
+
+def channels(result: HasTables) -> go.Figure:
+    """Draw every other channel, one panel per unit."""
+    frame = table(result, "channels")
+    names = other_names(result)
+    shown = frame.filter(pl.col("channel").is_in(names))
+    units = shown["unit"].unique(maintain_order=True).to_list()
+    figure = style.panels(max(len(units), 1), shared_xaxes=True)
+    if not names:
+        return style.note(figure, words.PLOT["no_other_channel_was_read"])
+    for row, unit in enumerate(units, start=1):
+        own = shown.filter(pl.col("unit") == unit)
+        for name in own["channel"].unique(maintain_order=True):
+            part = own.filter(pl.col("channel") == name).sort("time")
+            figure.add_trace(_channel_line(part, name, names.index(name)), row=row, col=1)
+        figure.update_yaxes(
+            title_text=f"{words.PLOT['reading']} ({style.text(unit)})", row=row, col=1
+        )
+    figure.update_xaxes(title_text=words.PLOT["time"], row=len(units), col=1)
+    figure.update_layout(height=160 + 180 * len(units))
+    return figure
+
+
+def _channel_line(part: pl.DataFrame, name: str, k: int) -> go.Scatter:
+    part = style.thinned(part, ["value"], MOST_STATES)
+    return go.Scatter(
+        x=part["t_s"],
+        y=part["value"],
+        mode="lines",
+        name=style.text(name),
+        line={"color": style.colour(k), "dash": style.dash(k), "width": 1.5},
+        connectgaps=False,
+        hovertemplate="%{x:.2f} s<br>%{y:.5g}<extra>%{fullData.name}</extra>",
     )

@@ -3,6 +3,7 @@
 import plotly.graph_objects as go
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.plots import style
 from lidar_deflect.plots.source import HasTables, table
 
@@ -14,7 +15,7 @@ def deflected_shapes(result: HasTables) -> go.Figure:
     figure = style.panels(2, shared_xaxes=True)
     steps = result.steps.filter(pl.col("x_m").is_not_null())
     if steps.is_empty():
-        return style.note(figure, "no load step was measured")
+        return style.note(figure, words.PLOT["no_load_step_was_measured"])
     contour = table(result, "contour")
     for k, step in enumerate(steps["step"].unique(maintain_order=True)):
         rows = steps.filter(pl.col("step") == step).sort("s_m")
@@ -22,9 +23,9 @@ def deflected_shapes(result: HasTables) -> go.Figure:
         line = rows if found is None else found
         for row, axis in enumerate("xy", start=1):
             _add_line(figure, line, rows, axis, row, step, k)
-    figure.update_xaxes(title_text="z (m)", row=2, col=1)
-    figure.update_yaxes(title_text="x (m)", row=1, col=1)
-    figure.update_yaxes(title_text="y (m)", row=2, col=1)
+    figure.update_xaxes(title_text=words.PLOT["z"], row=2, col=1)
+    figure.update_yaxes(title_text=words.PLOT["x"], row=1, col=1)
+    figure.update_yaxes(title_text=words.PLOT["y"], row=2, col=1)
     figure.update_layout(height=560)
     return figure
 

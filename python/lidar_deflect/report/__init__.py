@@ -1,7 +1,8 @@
 """One HTML file that works offline, from a result folder and nothing else.
 
-`words` holds every sentence, `document` says what a report is made of, `build` makes it from a
+`document` says what a report is made of, `build` makes it from a
 folder, chapter by chapter; `page` sets it as HTML, `spreadsheet` as xlsx, `pdf` on paper.
+Its sentences are those of `lidar_deflect.words`.
 """
 
 from pathlib import Path

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from lidar_deflect import comparison
+from lidar_deflect import comparison, words
 from lidar_deflect.plots import Plots
-from lidar_deflect.report import digits, words
+from lidar_deflect.report import digits
 from lidar_deflect.report.curves import wires
 from lidar_deflect.report.document import Block, Cell, Column, Figure, Fold, Row, Table, Text
 from lidar_deflect.report.document import words as said

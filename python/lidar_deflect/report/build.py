@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from lidar_deflect import words
 from lidar_deflect.report import (
     against,
     checks,
@@ -14,7 +15,6 @@ from lidar_deflect.report import (
     key,
     tested,
     verdict,
-    words,
 )
 from lidar_deflect.report.checks import flat, label
 from lidar_deflect.report.document import (
@@ -48,7 +48,7 @@ def document(folder: Folder) -> Document:
         ("comparison", against.blocks(folder)),
         ("calibration", evidence.calibration(folder)),
         ("health", evidence.health(folder)),
-        ("checks", (checks.check_table(folder),)),
+        ("checks", (checks.check_table(folder), Text((_length_why(),), quiet=True))),
         ("method", _method(folder)),
         ("left_out", evidence.left_out(folder)),
         ("configuration", _configuration(folder)),
@@ -69,6 +69,11 @@ def document(folder: Folder) -> Document:
             "folder": folder.path.resolve().name,
         },
     ).numbered()
+
+
+def _length_why() -> str:
+    share = digits.percent(100.0 * checks.LENGTH_SHARE, 2)
+    return words.LENGTH_WHY.format(limit=share)
 
 
 def _method(folder: Folder) -> tuple[Block, ...]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from lidar_deflect import tables
-from lidar_deflect.report import digits, words
+from lidar_deflect import tables, words
+from lidar_deflect.report import digits
 from lidar_deflect.report.document import Cell, Column, Table
 from lidar_deflect.report.document import words as said
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from lidar_deflect import behaviour
+from lidar_deflect import behaviour, words
 from lidar_deflect.plots import Plots
-from lidar_deflect.plots.series import wire_names
+from lidar_deflect.plots.series import other_names, wire_names
 from lidar_deflect.plots.source import sections, some
 from lidar_deflect.plots.spans import has_rotations
-from lidar_deflect.report import digits, replay, words
+from lidar_deflect.report import digits, replay
 from lidar_deflect.report.document import Block, Cell, Column, Figure, Fold, Replay, Table, Text
 from lidar_deflect.report.document import words as said
 
@@ -31,6 +31,9 @@ def curves(folder: Folder) -> tuple[Block, ...]:
     found: list[Block] = [figures[name] for name in shown]
     if rest:
         found.append(Fold(words.MORE_SECTIONS.format(count=len(rest)), rest))
+    if other_names(folder):
+        caption = words.CAPTIONS["channels"]
+        found.append(Figure("channels", caption, Plots(folder).channels(), link="time"))
     if folder.deflection.height > most * len(known):
         found.append(Text((words.THINNED,), quiet=True))
     return tuple(found)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.plots import Plots
-from lidar_deflect.report import digits, words
+from lidar_deflect.report import digits
 from lidar_deflect.report.checks import flat, label
 from lidar_deflect.report.document import (
     Block,
@@ -68,9 +69,9 @@ def _rest(document: Mapping[str, Any], lidars: list[Mapping[str, Any]]) -> list[
 
 
 def _poses(lidars: list[Mapping[str, Any]]) -> Table:
-    columns = [Column("lidar", numeric=False)]
+    columns = [Column(words.HEADS["lidar"], numeric=False)]
     columns += [Column(axis, "m") for axis in "xyz"]
-    columns += [Column(f"U turn {axis}", "mrad") for axis in "xyz"]
+    columns += [Column(f"{words.HEADS['turn']} {axis}", "mrad") for axis in "xyz"]
     rows = tuple(_pose(each) for each in lidars)
     return Table("poses", words.POSES_CAPTION, tuple(columns), (rows,))
 
@@ -93,7 +94,7 @@ def _evidence(lidars: list[Mapping[str, Any]]) -> Table | None:
     names = list(dict.fromkeys(name for each in lidars for name in each.get("evidence") or {}))
     if not names:
         return None
-    columns = [Column("what", numeric=False)]
+    columns = [Column(words.HEADS["what"], numeric=False)]
     columns += [Column(str(each.get("id", "")), numeric=False) for each in lidars]
     rows = tuple(
         (
@@ -173,8 +174,8 @@ def _statuses(folder: Folder) -> Table | None:
         for row in counted.iter_rows(named=True)
     )
     heads = ("section", "status", "meaning", "reason")
-    columns = [Column(head, numeric=False) for head in heads]
-    columns += [Column("states"), Column("share", "%")]
+    columns = [Column(words.HEADS[head], numeric=False) for head in heads]
+    columns += [Column(words.HEADS["states"]), Column(words.HEADS["share"], "%")]
     return Table("statuses", words.STATUS_CAPTION, tuple(columns), (rows,))
 
 
@@ -198,7 +199,11 @@ def left_out(folder: Folder) -> tuple[Block, ...]:
     )
     if not rows:
         return (*found, Text((words.NOTHING_DROPPED,)))
-    columns = (Column("where", numeric=False), Column("reason", numeric=False), Column("count"))
+    columns = (
+        Column(words.HEADS["where"], numeric=False),
+        Column(words.HEADS["reason"], numeric=False),
+        Column(words.HEADS["count"]),
+    )
     return (*found, Table("drops", words.DROPS_CAPTION, columns, (rows,)))
 
 

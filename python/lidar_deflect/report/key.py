@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from lidar_deflect import behaviour
+from lidar_deflect import behaviour, words
 from lidar_deflect.comparison.methods import largest_step
-from lidar_deflect.report import digits, words
+from lidar_deflect.report import digits
 from lidar_deflect.report.document import Block, Cell, Column, Fold, Row, Table, Text
 from lidar_deflect.report.document import words as said
 from lidar_deflect.report.verdict import judged

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from plotly.io import to_json
 from plotly.offline import get_plotlyjs
 
-from lidar_deflect.report import words
+from lidar_deflect import words
 from lidar_deflect.report.document import (
     Bullets,
     Code,

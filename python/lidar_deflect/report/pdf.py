@@ -8,10 +8,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lidar_deflect import words
 from lidar_deflect.extras import need
 from lidar_deflect.files import whole_file
 from lidar_deflect.folder import Folder
-from lidar_deflect.report import drawn, fonts, words
+from lidar_deflect.report import drawn, fonts
 from lidar_deflect.report.build import document
 from lidar_deflect.report.document import (
     Block,

@@ -22,6 +22,8 @@ _MOST_FRAMES = 600
 _MOST_SECTIONS = 40
 _MOST_STATIONS = 60
 _MOST_POINTS = 80_000
+_FEWEST_ECHOES = 250
+_SHORTEST_S = 0.1
 
 
 def data(folder: Folder) -> dict[str, Any] | None:
@@ -117,7 +119,7 @@ def _clouds(points: pl.DataFrame) -> dict[str, Any] | None:
         return None
     points = points.sort("time", maintain_order=True)
     points = points.gather_every(-(-points.height // _MOST_POINTS))
-    times, first = np.unique(points["t_s"].to_numpy(), return_index=True)
+    times, first = np.unique(_framed(points["t_s"].to_numpy()), return_index=True)
     lidars = points["lidar"].unique().sort().to_list()
     index = {name: k for k, name in enumerate(lidars)}
     residual = 1e3 * points["residual_m"].cast(pl.Float64).fill_null(float("nan")).to_numpy()
@@ -129,6 +131,15 @@ def _clouds(points: pl.DataFrame) -> dict[str, Any] | None:
         "residual": _packed(residual) if np.isfinite(residual).any() else None,
         "lidars": lidars,
     }
+
+
+def _framed(t_s: Floats) -> Floats:
+    """Return the frame of each echo: its own time, or a stretch of time where each has its own."""
+    if np.unique(t_s).size <= max(_MOST_FRAMES, t_s.size // _FEWEST_ECHOES):
+        return t_s
+    width = max(_SHORTEST_S, float(np.ptp(t_s)) * _FEWEST_ECHOES / t_s.size)
+    framed: Floats = (np.floor(t_s / width) + 0.5) * width
+    return framed
 
 
 def _packed(values: npt.NDArray[Any]) -> str:

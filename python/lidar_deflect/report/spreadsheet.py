@@ -7,13 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from lidar_deflect import tables
+from lidar_deflect import tables, words
 from lidar_deflect.extras import need
 from lidar_deflect.files import whole_file
 from lidar_deflect.folder import Folder
 from lidar_deflect.plots import style
 from lidar_deflect.plots.source import sections, some
-from lidar_deflect.report import words
 from lidar_deflect.report.build import document
 
 if TYPE_CHECKING:

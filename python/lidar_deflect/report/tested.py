@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lidar_deflect import words
 from lidar_deflect.plots.source import sections
-from lidar_deflect.report import digits, words
+from lidar_deflect.report import digits
 from lidar_deflect.report.checks import flat
 from lidar_deflect.report.document import Block, Bullets, Cell, Column, Facts, Row, Table, Text
 from lidar_deflect.report.document import words as said
@@ -89,9 +90,17 @@ def _lidars(folder: Folder) -> Table | None:
     if not rows:
         return None
     heads = ("lidar", "model", "source", "returns")
-    columns = [Column(head, numeric=False) for head in heads]
-    columns += [Column("x", "m"), Column("y", "m"), Column("z", "m"), Column("rate", "1/min")]
-    columns += [Column("clock", numeric=False), Column("beams", numeric=False)]
+    columns = [Column(words.HEADS[head], numeric=False) for head in heads]
+    columns += [
+        Column("x", "m"),
+        Column("y", "m"),
+        Column("z", "m"),
+        Column(words.HEADS["rate"], "1/min"),
+    ]
+    columns += [
+        Column(words.HEADS["clock"], numeric=False),
+        Column(words.HEADS["beams"], numeric=False),
+    ]
     return Table("lidars", words.LIDARS_CAPTION, tuple(columns), (rows,))
 
 
@@ -131,7 +140,11 @@ def _inputs(folder: Folder) -> Table | None:
     )
     if not rows:
         return None
-    columns = (Column("input", numeric=False), Column("size"), Column("SHA-256", numeric=False))
+    columns = (
+        Column(words.HEADS["input"], numeric=False),
+        Column(words.HEADS["size"]),
+        Column("SHA-256", numeric=False),
+    )
     return Table("inputs", words.INPUTS_CAPTION, columns, (rows,))
 
 
@@ -144,5 +157,8 @@ def _software(folder: Folder) -> Table:
     timings = run.get("timings_s") or {}
     pairs += [(f"time for {stage}", f"{float(value):.1f} s") for stage, value in timings.items()]
     rows = tuple((said(name), said(value)) for name, value in pairs)
-    columns = (Column("what", numeric=False), Column("value", numeric=False))
+    columns = (
+        Column(words.HEADS["what"], numeric=False),
+        Column(words.HEADS["value"], numeric=False),
+    )
     return Table("software", words.SOFTWARE_CAPTION, columns, (rows,))

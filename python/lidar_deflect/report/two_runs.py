@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import plotly.graph_objects as go
 
+from lidar_deflect import words
 from lidar_deflect.comparison import runs
 from lidar_deflect.files import write_text
 from lidar_deflect.folder import Folder
 from lidar_deflect.plots import style
-from lidar_deflect.report import digits, words
+from lidar_deflect.report import digits
 from lidar_deflect.report.document import (
     Block,
     Cell,

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.comparison.judgement import Judged, judge
-from lidar_deflect.report import checks, digits, words
+from lidar_deflect.report import checks, digits
 from lidar_deflect.report.document import Headline, Verdict
 from lidar_deflect.steps import SEEN
 

@@ -4,6 +4,7 @@ use lidar_deflect_core::error::{
     BeamError, CaptureError, ClusterError, Coded, FitError, InvalidValue, ReadError, UnitError,
 };
 use lidar_deflect_core::paper::tip::NoTip;
+use lidar_deflect_core::register::network::NetworkError;
 use lidar_deflect_core::register::wall::WallError;
 use lidar_deflect_files::FileError;
 use pyo3::exceptions::PyRuntimeError;
@@ -54,6 +55,7 @@ translate! {
     InvalidValue => "InvalidValueError",
     ReadError => "InvalidValueError",
     UnitError => "InvalidValueError",
+    NetworkError => "CalibrationError",
     NoTip => "MeasurementError",
     WallError => "CalibrationError",
 }

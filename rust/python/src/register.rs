@@ -1,4 +1,6 @@
-//! Closed-form registration: rotations, and the yaw of a wall.
+//! Registration: rotations and the yaw of a wall in closed form; the network in a file of its own.
+
+mod network;
 
 use lidar_deflect_core::register::closed_form;
 use lidar_deflect_core::register::wall::{self, ExpectedWall};
@@ -12,6 +14,7 @@ use crate::error::BorderResult;
 
 /// Adds this file's functions to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    network::register(module)?;
     module.add_function(wrap_pyfunction!(rotation_onto, module)?)?;
     module.add_function(wrap_pyfunction!(rotation_about_up, module)?)?;
     module.add_function(wrap_pyfunction!(yaw_from_wall, module)?)

@@ -1,7 +1,7 @@
 """The beam method: a blade that bends as blades bend, fitted to every ray and edge at its own time.
 
-`measure` adjusts all holds together with lidars and surface, then follows the blade between them; the
-numbers are made in Rust. Source: docs/method.md.
+`measure` adjusts all holds together with lidars and surface, then follows the blade between them;
+the numbers are made in Rust. Source: docs/method.md.
 """
 
 from __future__ import annotations
@@ -52,11 +52,11 @@ def measure(inputs: Inputs) -> States:
     s_m = np.array([*sections, *stations])
     followed = follow(inputs, expected, solved, s_m, times_ns)
     covariance = HoldCovariance.of(solved, s_m, LAST)
-    reference = covariance.values[0, :, :3]
+    reference = _reference(inputs, followed, times_ns, covariance)
     moved = followed.values[..., :3] - reference
     uncertainty = over_time(covariance, solved, expected, followed, times_ns, moved)
     of = slice(0, len(sections))
-    status, reason = _grades(followed, times_ns, solved)
+    status, reason = _grades(followed)
     every = max(1, round(inputs.rate_hz))
     return States(
         time_ns=times_ns,
@@ -92,18 +92,30 @@ def moments(inputs: Inputs) -> NDArray[np.int64]:
     return np.arange(first, last + 1, dtype=np.int64) * period_ns
 
 
+def _reference(
+    inputs: Inputs, followed: Followed, times_ns: NDArray[np.int64], covariance: HoldCovariance
+) -> Floats:
+    """Unloaded position of every section, shape (s, 3): the mean of the unloaded hold's states."""
+    if inputs.unloaded_ns is None:
+        return np.asarray(covariance.values[0, :, :3])
+    inside = (times_ns >= inputs.unloaded_ns[0]) & (times_ns <= inputs.unloaded_ns[1])
+    states = followed.values[inside, :, :3]
+    known = ~np.isnan(states).any(axis=(1, 2))
+    if not known.any():
+        return np.asarray(covariance.values[0, :, :3])
+    return np.asarray(states[known].mean(axis=0))
+
+
 def _stations(inputs: Inputs) -> list[float]:
     length = inputs.config.blade.length_m
     first = np.ceil(FIRST_STATION_SHARE * length / STATION_M) * STATION_M
     return [float(s) for s in np.arange(first, length + 1e-9, STATION_M)]
 
 
-def _grades(
-    followed: Followed, times_ns: NDArray[np.int64], solved: Solved
-) -> tuple[NDArray[np.uint8], NDArray[np.object_]]:
+def _grades(followed: Followed) -> tuple[NDArray[np.uint8], NDArray[np.object_]]:
     """Status and reason of each moment, shape (t,)."""
-    status = np.full(len(times_ns), OK, dtype=np.uint8)
-    reason = np.full(len(times_ns), None, dtype=object)
+    status = np.full(len(followed.used), OK, dtype=np.uint8)
+    reason = np.full(len(followed.used), None, dtype=object)
     rest = followed.in_hold == 0
     usual = np.median(followed.used[rest], axis=0) if rest.any() else followed.used.max(axis=0)
     few = followed.used.sum(axis=1) < 0.25 * FEW_POINTS * usual.sum()
@@ -177,7 +189,9 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
             "hold": hold.label,
             "share": share,
             "echoes": len(told["residual_m"]),
-            "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2))) if len(told["residual_m"]) else None,
+            "rms_m": float(np.sqrt(np.mean(told["residual_m"] ** 2)))
+            if len(told["residual_m"])
+            else None,
             "rejected": told["rejected"],
             "edges": len(told["edges"]),
             "edges_left_out": list(told["edges_left_out"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from lidar_deflect import _native
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
-from lidar_deflect.measurement.beam.drawing import blade_of
+from lidar_deflect.measurement.beam.drawing import drawing_of
 from lidar_deflect.measurement.beam.rig import rig_prior
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
 
 LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
-BLADE = ((1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
+BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
 ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
 """Gates of echoes along and of edges across the ray, metres, while the blade is being found."""
 LAST = (0.05, 0.05)
@@ -44,8 +45,6 @@ SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
 MAX_LAST = 12
 
-TRUST = (0.05, 0.5, 0.05, 1.5e-5, 1e-3)
-"""Prior: stiffness, weight, prebend (relative), stress-free curvature (rad/m), root (rad)."""
 NOISE_M, SURFACE_M, EDGE_RAD = 0.015, 0.002, 1e-4
 
 
@@ -58,7 +57,8 @@ class Solved:
     native
         The adjustment, from which states follow.
     holds, spans_ns, shares
-        Holds that took part, the stretches of them that were used, their loads as shares of full load.
+        Holds that took part, least load first, the stretches of them that were used, and their
+        loads as shares of full load.
     told
         What became of the data in the last step.
     steps
@@ -129,8 +129,8 @@ def _started(
     spans: Sequence[tuple[int, int]],
     shares: Sequence[float],
 ) -> _native.BeamAdjustment:
-    blade = blade_of(inputs.config)
-    forces = blade.forces_for(
+    drawing = drawing_of(inputs.config)
+    forces = drawing.blade.forces_for(
         expected.direction, expected.s_m.tolist(), expected.deflection_m.tolist()
     )
     if forces is None:
@@ -141,9 +141,8 @@ def _started(
         )
     full_n = forces[:, None] * expected.direction
     rig = rig_prior(inputs)
-    setting_rad = float(np.radians(inputs.config.blade.setting_u_deg))
     return _native.BeamAdjustment(
-        blade,
+        drawing.blade,
         seen_in(inputs, spans),
         spans_ns=list(spans),
         forces_n=np.array(shares)[:, None, None] * full_n,
@@ -153,8 +152,8 @@ def _started(
         rig_prior=rig.values,
         rig_covariance=rig.covariance,
         from_m=SEEN_SHARE * inputs.config.blade.length_m,
-        trust=TRUST,
-        shape_trust=(0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002),
+        trust=drawing.trust,
+        shape_trust=drawing.shape_trust,
         noise_m=NOISE_M,
         surface_m=SURFACE_M,
         edge_rad=EDGE_RAD,
@@ -171,7 +170,8 @@ def _settle(native: _native.BeamAdjustment, inputs: Inputs) -> tuple[Mapping[str
     total = len(schedule) + MAX_LAST
     for place, (echo_m, edge_m, stage) in enumerate(schedule):
         told = native.step(echo_m, edge_m, stage)
-        native.linearise()
+        with suppress(MeasurementError):  # a step too far is brought back by the next ones
+            native.linearise()
         if listener:
             listener(place + 1, total)
     steps = len(schedule)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from lidar_deflect import _native, geometry
 from lidar_deflect.errors import ConfigError
+from lidar_deflect.measurement.beam import generic
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,39 +29,83 @@ def saddles_m(config: Config) -> list[float]:
     return sorted(given) or [share * length for share in SADDLE_SHARES]
 
 
-def blade_of(config: Config) -> _native.BeamBlade:
-    """Cut the drawing into elements.
+@dataclass(frozen=True)
+class Drawing:
+    """A blade cut into elements, and how far it may differ from what is built.
+
+    Attributes
+    ----------
+    blade
+        The blade of the compiled core.
+    trust
+        Prior deviations of stiffness, weight, prebend (relative), stress-free curvature (rad/m) and
+        the root's rotation (rad).
+    shape_trust
+        Of chord, its waves (relative), setting angle, waves of twist (rad), axis (chord lengths) and
+        waves of the surface (m).
+    source
+        ``drawing`` or ``generic``.
+    """
+
+    blade: _native.BeamBlade
+    trust: tuple[float, ...]
+    shape_trust: tuple[float, ...]
+    source: str
+
+
+def drawing_of(config: Config) -> Drawing:
+    """Take the drawing, else a blade as blades are.
 
     Raises
     ------
     ConfigError
-        If geometry, contours, stiffness or the sides of the blade are not given.
+        If the sides of the blade are not given.
     """
-    drawing = geometry.read_geometry(config.blade)
-    if drawing is None or drawing.contours is None:
-        raise _lacking("geometry" if drawing is None else "contours")
-    if config.blade.leading_edge is None or config.blade.suction_side is None:
+    blade = config.blade
+    if blade.leading_edge is None or blade.suction_side is None:
         raise _lacking("leading_edge and suction_side")
-    stations, contours = drawing.stations, drawing.contours
-    if stations.ei_edge_nm2 is None or stations.ei_flap_nm2 is None or stations.gj_nm2 is None:
-        raise _lacking("stiffness (ei_edge_nm2, ei_flap_nm2, gj_nm2) in geometry")
-    columns = (
-        stations.s_m,
-        stations.chord_m,
-        stations.twist_rad,
-        stations.prebend_m,
-        stations.axis_fraction,
-        stations.ei_edge_nm2,
-        stations.ei_flap_nm2,
-        stations.gj_nm2,
-    )
+    given = geometry.read_geometry(blade)
+    setting_rad = float(np.radians(blade.setting_u_deg))
+    columns = None if given is None else _columns(given.stations)
+    if given is None or given.contours is None or columns is None:
+        at_m, outlines = generic.outlines(blade)
+        native = _native_of(config, generic.stations(blade), at_m, outlines)
+        shape = (0.1, 0.05, max(setting_rad, 0.03), 0.02, blade.axis_fraction_u, 0.02)
+        return Drawing(native, (0.25, 0.7, 0.0, 1.5e-4, 2e-3), shape, "generic")
+    outlines = np.stack([given.contours.x_c, given.contours.y_c], axis=2)
+    native = _native_of(config, columns, given.contours.s_m, outlines)
+    shape = (0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002)
+    return Drawing(native, (0.05, 0.5, 0.05, 1.5e-5, 1e-3), shape, "drawing")
+
+
+def _native_of(
+    config: Config, stations: Floats, outline_s_m: Floats, outlines: Floats
+) -> _native.BeamBlade:
     return _native.BeamBlade(
-        np.column_stack(columns),
-        contours.s_m.tolist(),
-        np.stack([contours.x_c, contours.y_c], axis=2),
+        stations,
+        outline_s_m.tolist(),
+        outlines,
         leading_edge=np.array(config.blade.leading_edge, dtype=np.float64),
         suction_side=np.array(config.blade.suction_side, dtype=np.float64),
         saddles_s_m=saddles_m(config),
+    )
+
+
+def _columns(stations: geometry.Stations) -> Floats | None:
+    """Columns of the drawing; None where it has no stiffness."""
+    if stations.ei_edge_nm2 is None or stations.ei_flap_nm2 is None or stations.gj_nm2 is None:
+        return None
+    return np.column_stack(
+        [
+            stations.s_m,
+            stations.chord_m,
+            stations.twist_rad,
+            stations.prebend_m,
+            stations.axis_fraction,
+            stations.ei_edge_nm2,
+            stations.ei_flap_nm2,
+            stations.gj_nm2,
+        ]
     )
 
 

@@ -76,7 +76,9 @@ def follow(
     stretches = _stretches(times_ns, in_hold)
     for start in range(0, len(stretches), CHUNK):
         part = stretches[start : start + CHUNK]
-        for inside, result in zip(part, _between(inputs, expected, solved, s_m, times_ns, part), strict=True):
+        for inside, result in zip(
+            part, _between(inputs, expected, solved, s_m, times_ns, part), strict=True
+        ):
             if result is None:
                 continue
             values[inside] = result[0].reshape(len(inside), len(s_m), 4)

@@ -37,7 +37,7 @@ class RigPrior:
     channels
         Channels of each lidar.
     values, covariance
-        Per lidar rotation (rad), translation (m), elevation (rad), range scale and channel offsets (m).
+        Per lidar rotation (rad), translation (m), elevation (rad), range scale, channel offsets (m).
     """
 
     poses: Floats
@@ -98,7 +98,8 @@ def _take_joint(
     """Put in what the network adjustment found, in its own order of lidars."""
     counts = [len(nuisances.channel_offset_m) for nuisances in joint.nuisances]
     theirs = dict(zip(joint.lidars, _starts(counts), strict=False))
-    places, sources = [], []
+    places: list[int] = []
+    sources: list[int] = []
     for lidar, start, count in zip(lidars, _starts(channels), channels, strict=False):
         if lidar not in theirs:
             continue

@@ -1,4 +1,4 @@
-"""Standard uncertainties of positions, deflections and twist from the joint covariance of the holds."""
+"""Standard uncertainties of positions, deflections and twist, from the holds' joint covariance."""
 
 from __future__ import annotations
 
@@ -66,8 +66,15 @@ class HoldCovariance:
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """Standard uncertainties over time: of position and deflection (t, s, 3), of the total deflection
-    and the twist change in rad (t, s)."""
+    """Standard uncertainties over time.
+
+    Attributes
+    ----------
+    position_m, deflection_m
+        Of positions and deflections, shape (t, s, 3).
+    total_m, twist_rad
+        Of the norm of the deflection and of the twist change, shape (t, s).
+    """
 
     position_m: Floats
     deflection_m: Floats
@@ -107,10 +114,8 @@ def over_time(
     )
 
 
-def _between(
-    shares: Floats, load: Floats
-) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Holds whose loads lie on both sides of each load, and the share of the way between them."""
+def _between(shares: Floats, load: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
+    """Find the holds on both sides of each load, and the share of the way between them."""
     order = np.argsort(shares, kind="stable")
     sorted_shares = shares[order]
     above = np.clip(np.searchsorted(sorted_shares, load), 1, max(1, len(shares) - 1))

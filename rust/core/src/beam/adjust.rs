@@ -268,6 +268,16 @@ impl Adjustment {
         }
     }
 
+    /// Changes one unknown: those of the lidars in their own unit, others in standard deviations.
+    pub fn shift(&mut self, unknown: usize, change: f64) {
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        if (rig..rig + count).contains(&unknown) {
+            self.rig.values[unknown - rig] += change;
+        } else {
+            self.values[unknown] += change;
+        }
+    }
+
     /// Shared and own unknowns of a hold.
     fn state(&self, hold: usize) -> DVector<f64> {
         let own = self

@@ -110,7 +110,7 @@ mod tests {
         let (ahead, behind) = (moved(1.0), moved(-1.0));
         let slope = (ahead.place[60] - behind.place[60]) / (2.0 * step);
         let error = (slope - field.place[60]).norm() / slope.norm();
-        assert!(error < 1e-4, "{error}");
+        assert!(error < 2e-4, "{error}");
         let spin = (ahead.turn[60] - behind.turn[60]) * axis.turn[60].transpose() / (2.0 * step);
         let slope = Vector3::new(spin[(2, 1)], spin[(0, 2)], spin[(1, 0)]);
         assert!((slope - field.turn[60]).norm() < 1e-4 * slope.norm());

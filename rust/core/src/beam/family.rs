@@ -121,9 +121,9 @@ pub struct Loading {
 /// Share of full load that cables and saddles put on the blade whatever the load channel says.
 const IDLE_SHARE: f64 = 0.01;
 /// Relative standard deviation of how the load is spread over the saddles.
-const SPREAD: f64 = 0.4;
+const SPREAD: f64 = 0.8;
 /// Relative standard deviation of what the load has across its direction.
-const SIDEWAYS: f64 = 0.3;
+const SIDEWAYS: f64 = 0.4;
 /// Lever of a saddle's pull about the axis, metres.
 const LEVER_M: f64 = 0.6;
 

@@ -17,6 +17,8 @@ pub mod normal;
 pub mod posed;
 pub mod rig;
 pub mod rows;
+#[cfg(test)]
+mod sample;
 pub mod sections;
 pub mod shape;
 pub mod sight;

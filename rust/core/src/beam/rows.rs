@@ -150,7 +150,9 @@ impl<'a> Rows<'a> {
             self.tally.unfit += 1;
             return arc_m;
         }
-        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring);
+        let mut row = self.echo_row(echo, &hit);
+        let built_m = self.built(&row);
+        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - built_m;
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
         let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
@@ -166,7 +168,6 @@ impl<'a> Rows<'a> {
             residual_m: residual,
             point: lidar.origin + direction * (hit.range_m + residual),
         });
-        let mut row = self.echo_row(echo, &hit);
         let weight = robust(residual, sigma, self.gates.echo_m) / (sigma * sigma);
         self.normal.add(&mut row, residual, weight);
         arc_m
@@ -192,6 +193,16 @@ impl<'a> Rows<'a> {
         let mesh = &self.adjustment.problem.mesh;
         let section = &contact.section;
         mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
+    }
+
+    /// What the surface as built adds to the prediction of the drawing, by a row's slopes.
+    fn built(&self, row: &[(usize, f64)]) -> f64 {
+        let (layout, values) = (&self.adjustment.layout, &self.adjustment.values);
+        let surface = layout.shape_at()..layout.edge_at();
+        let of_surface = row.iter().filter(|entry| surface.contains(&entry.0));
+        of_surface
+            .map(|(unknown, slope)| slope * values[*unknown])
+            .sum()
     }
 
     fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
@@ -278,7 +289,9 @@ impl<'a> Rows<'a> {
         let at = layout.edge_offset_at(self.hold, edge.lidar, side);
         let values = &self.adjustment.values;
         let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
-        let residual = 0.5 * step_rad - silhouette.angle_rad - outside;
+        let mut row = self.edge_row(edge, plane, silhouette);
+        let built_rad = self.built(&row);
+        let residual = 0.5 * step_rad - silhouette.angle_rad - outside - built_rad;
         let coarse_rad = self.gates.coarse_m()[1] / silhouette.range_m;
         let sigma_rad = self.adjustment.weights.edge_rad.hypot(coarse_rad);
         let sigma = (step_rad / 12f64.sqrt()).hypot(sigma_rad);
@@ -291,7 +304,6 @@ impl<'a> Rows<'a> {
         self.tally
             .edges
             .push((edge.lidar, side, residual / step_rad));
-        let mut row = self.edge_row(edge, plane, silhouette);
         row.push((layout.edge_at(), EDGE_RAD));
         row.push((at, EDGE_OFFSET_RAD));
         let weight = robust(residual, sigma, gate_rad) / (sigma * sigma);
@@ -323,4 +335,51 @@ fn side_of(x_c: f64) -> usize {
 fn robust(residual: f64, sigma: f64, gate: f64) -> f64 {
     let width = (ROBUST * sigma).max(0.3 * gate);
     1.0 / (1.0 + (residual / width).powi(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::adjust::Stage;
+    use super::super::sample;
+    use super::*;
+
+    const WIDE: Gates = Gates {
+        echo_m: 3.0,
+        edge_m: 3.0,
+        stage: Stage::All,
+    };
+
+    #[test]
+    fn slopes_of_all_unknowns_are_those_of_the_residuals() {
+        let adjustment = sample::adjustment(0.02);
+        let (normal, _) = adjustment.normal(&WIDE);
+        let step = 0.02;
+        let cost = |unknown: usize, change: f64| {
+            let mut moved = adjustment.clone();
+            moved.shift(unknown, change);
+            moved.normal(&WIDE).0.cost
+        };
+        let rig = adjustment.layout.lidar_at(0)..adjustment.layout.shape_at();
+        let scale = normal.right.amax();
+        for unknown in (0..adjustment.layout.len()).step_by(7) {
+            // Unknowns of the lidars have units of their own.
+            let step = if rig.contains(&unknown) { 1e-5 } else { step };
+            let slope = (cost(unknown, step) - cost(unknown, -step)) / (2.0 * step);
+            let expected = -2.0 * normal.right[unknown];
+            let close = (slope - expected).abs() < 0.03 * expected.abs() + 2e-3 * scale;
+            assert!(close, "unknown {unknown}: {slope} instead of {expected}");
+        }
+    }
+
+    #[test]
+    fn at_the_true_state_no_unknown_is_pulled_beyond_noise() {
+        let adjustment = sample::adjustment(0.0);
+        let (normal, tallies) = adjustment.normal(&WIDE);
+        assert!(tallies[0].used.len() > 1000 && tallies[0].edges.len() > 50);
+        for unknown in 0..adjustment.layout.len() {
+            let weight = normal.matrix[(unknown, unknown)];
+            let pull = normal.right[unknown] / weight.sqrt();
+            assert!(pull.abs() < 4.5, "unknown {unknown} is pulled by {pull}");
+        }
+    }
 }

@@ -8,9 +8,9 @@ use super::family::{self, Kind, Unknown};
 use super::mesh::Mesh;
 
 /// Relative standard deviation of a load at one saddle about the even spread.
-const SPREAD: f64 = 0.3;
+const SPREAD: f64 = 0.15;
 /// Relative standard deviation of a prediction.
-const PREDICTED: f64 = 0.02;
+const PREDICTED: f64 = 0.03;
 const STEPS: usize = 12;
 
 /// Forces at the saddles, newtons along `direction`, for which the sections at `s_m` move by

@@ -1,4 +1,18 @@
 //! Registration: from what several lidars see of the yard to their poses in the world.
+//!
+//! Two ways: the paper's closed form, lidar by lidar, and one adjustment of everything that is known.
 
 pub mod closed_form;
+pub mod field;
+pub mod hold;
+pub mod network;
+pub mod normal;
+pub mod rows;
+pub mod select;
+pub mod skyline;
+pub mod start;
+pub mod state;
+pub mod surface;
+pub mod survey;
+pub mod variogram;
 pub mod wall;

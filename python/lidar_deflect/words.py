@@ -1,4 +1,4 @@
-"""Every sentence of the report, in one place: a translation is this file in another language."""
+"""Every sentence and label of report and figures: a translation is this file in another tongue."""
 
 PAPER = "Hu, Zhu, Zhou, Liu, Optics 2024, 5, 151-164"
 LANGUAGE = "en"
@@ -152,6 +152,7 @@ CAPTIONS = {
         "turn as well. Dots are echoes, the thick line is the blade, the thin one its unloaded "
         "shape, rings are the sections, squares the lidars, crosses the winch ends of wires."
     ),
+    "channels": "Other instruments, on the clock of the lidars.",
     "wires": (
         "Draw wires: the reading, and what the wire would have read at the positions that the "
         "lidars measured. Where only the second stands, the wire is virtual. Below, the "
@@ -215,7 +216,6 @@ REPLAY = {
     "colour": "Colour by",
     "lidar": "lidar",
     "residual": "residual",
-    "magnify": "Deflection",
     "alt": "Replay of the blade in space",
     "between": "between holds",
     "step": "step",
@@ -313,7 +313,6 @@ HEALTH_COLUMNS = {
     "clock": "clock - UTC",
     "coverage": "coverage",
 }
-STREAMS_CAPTION = "What the capture's streams were recognised as."
 NO_HEALTH = "The folder holds no health table."
 STATUS_CAPTION = "States that were not measured as they should be, by section and reason."
 STATUS = {
@@ -428,7 +427,6 @@ NOT_CLAIMED = (
 EVIDENCE = "What the method decided on the way"
 
 # Warnings and drops
-WARNINGS = "Read before trusting the numbers"
 NO_WARNINGS = "The run gave no warning and passed its gates."
 DROPS_CAPTION = "Everything that arrived and did not count, by reason."
 NOTHING_DROPPED = "Nothing was left out."
@@ -469,3 +467,91 @@ TWO_RUNS_LARGEST = "largest difference of the total deflection"
 KEY = "key"
 SAME_SETTINGS = "Both runs have the same configuration."
 BEYOND = {"good": "explained", "bad": "beyond U", "open": "no uncertainty"}
+
+# Labels of the figures, by what they say in English
+PLOT = {
+    "95": "95 %",
+    "about_x": "about x (°)",
+    "about_y": "about y (°)",
+    "along_the_load_from_the_hold_s_mea": "along the load, from the hold's mean (mm)",
+    "amplitude": "amplitude (m)",
+    "arc_length_s": "arc length s (m)",
+    "blade_points": "blade points (1/s)",
+    "by_the_lidars": "by the lidars",
+    "clock_utc": "clock - UTC (ms)",
+    "coverage": "coverage (%)",
+    "cycle": "cycle",
+    "deflection_along_the_load": "deflection along the load (m)",
+    "difference": "difference",
+    "error": "error (%)",
+    "frequency": "frequency (Hz)",
+    "frequency_2": "frequency",
+    "from_the_line": "from the line (mm)",
+    "lidar": "lidar",
+    "lidar_wire": "lidar - wire (mm)",
+    "load": "load (%)",
+    "lost": "lost (%)",
+    "measured_model": "measured - model (mm)",
+    "missing": "missing",
+    "no_cycles_were_found": "no cycles were found",
+    "no_draw_wire_real_or_virtual_is_in": "no draw wire, real or virtual, is in the tables",
+    "no_health_was_written": "no health was written",
+    "no_hold_was_measured": "no hold was measured",
+    "no_load_channel_was_read": "no load channel was read",
+    "no_load_step_was_measured": "no load step was measured",
+    "no_other_channel_was_read": "no other channel was read",
+    "no_pose_was_watched": "no pose was watched",
+    "nothing_has_a_place": "nothing has a place",
+    "nothing_was_compared": "nothing was compared",
+    "points": "points (1/s)",
+    "reading": "reading",
+    "section": "section",
+    "shift": "shift (mm)",
+    "shift_along_x": "shift along x",
+    "shift_along_y": "shift along y",
+    "shift_along_z": "shift along z",
+    "shift_k_2": "shift, k = 2 (mm)",
+    "surveyed_point": "surveyed point",
+    "this_calibration_states_no_covaria": "this calibration states no covariance",
+    "this_method_gives_no_rotations_alo": "this method gives no rotations along the span",
+    "this_method_keeps_no_residuals": "this method keeps no residuals",
+    "time": "time (s)",
+    "time_in_the_hold": "time in the hold (s)",
+    "turn": "turn (mrad)",
+    "turn_about_x": "turn about x",
+    "turn_about_y": "turn about y",
+    "turn_about_z": "turn about z",
+    "turn_k_2": "turn, k = 2 (mrad)",
+    "turns": "turns (1/min)",
+    "twist": "twist (°)",
+    "wire": "wire",
+    "wire_anchor": "wire anchor",
+    "x": "x (m)",
+    "y": "y (m)",
+    "z": "z (m)",
+    "z_along_the_blade": "z, along the blade (m)",
+}
+
+# Heads of the tables that tell of lidars, files and states
+HEADS = {
+    "lidar": "lidar",
+    "model": "model",
+    "source": "source",
+    "returns": "returns",
+    "rate": "rate",
+    "clock": "clock",
+    "beams": "beams",
+    "input": "input",
+    "size": "size",
+    "what": "what",
+    "value": "value",
+    "section": "section",
+    "status": "status",
+    "meaning": "meaning",
+    "reason": "reason",
+    "states": "states",
+    "share": "share",
+    "where": "where",
+    "count": "count",
+    "turn": "U turn",
+}

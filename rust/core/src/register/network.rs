@@ -1,0 +1,501 @@
+//! One adjustment of everything that is known: scans, survey, tapes and priors.
+//!
+//! Poses of all lidars, what is wrong with each (offset of every channel, elevation, range scale), the
+//! surfaces with their bend and roughness, and targets are found together by robust Gauss-Newton; the
+//! joint covariance of all of it follows from the same normal equations.
+
+use nalgebra::{DMatrix, Vector3};
+use thiserror::Error;
+
+use super::field::Field;
+use super::hold::Hold;
+use super::normal::{Normal, Solved};
+use super::rows::{self, Row};
+use super::select::{self, Gate, Met};
+use super::state::{Layout, State, Term};
+use super::surface::Surface;
+use super::survey::Known;
+use super::variogram::{self, Sample};
+use crate::error::{Coded, InvalidValue};
+
+/// Prior sigmas of what may be wrong with a lidar, and of the bend of a surface over half its extent.
+#[derive(Debug, Clone, Copy)]
+pub struct Priors {
+    /// Of every channel's range offset, and of the common one of a unit, metres.
+    pub channel_offset_u_m: f64,
+    /// Of the elevation offset, radians.
+    pub elevation_u_rad: f64,
+    /// Of the range scale.
+    pub range_scale_u: f64,
+}
+
+/// Sigma of a surface's bend over half its extent, metres.
+const BEND_U_M: f64 = 0.02;
+/// Residuals beyond this many sigmas weigh less, beyond the second none at all.
+const DOUBTED: f64 = 2.5;
+const REFUSED: f64 = 6.0;
+/// Surveyed values beyond this many sigmas of their studentised residual are gross errors: one in
+/// sixteen thousand by chance.
+pub const GROSS: f64 = 4.0;
+/// Steps of one adjustment.
+const STEPS: usize = 12;
+/// An adjustment has settled when no pose moves by more than this part of its sigma.
+const SETTLED: f64 = 0.02;
+/// Gates of the search for surfaces, from the first poses to good ones.
+const GATES: [Gate; 4] = [
+    Gate {
+        near_m: 0.25,
+        turn_rad: 0.02,
+    },
+    Gate {
+        near_m: 0.15,
+        turn_rad: 0.005,
+    },
+    Gate {
+        near_m: 0.08,
+        turn_rad: 0.001,
+    },
+    Gate {
+        near_m: 0.06,
+        turn_rad: 0.0005,
+    },
+];
+/// A surface less rough than this is described by its smooth part alone, metres.
+const SMOOTH_M: f64 = 5e-4;
+/// Rounds in which roughness and the scatter of the channels' offsets are learned from what was found.
+const LEARNING_ROUNDS: usize = 2;
+/// It is not taken for less than this, metres.
+const LEAST_OFFSET_U_M: f64 = 2e-3;
+/// Holds nothing but an unknown that nothing else holds: radians, and metres.
+const LOOSE_RAD: f64 = 1.0;
+const LOOSE_M: f64 = 100.0;
+
+/// Everything that goes in.
+#[derive(Debug, Clone)]
+pub struct Network {
+    /// First guess; its surfaces are flat.
+    pub start: State,
+    /// What every lidar sees.
+    pub holds: Vec<Hold>,
+    /// What is known besides.
+    pub known: Vec<Known>,
+    /// What is wrong with a lidar to within what.
+    pub priors: Priors,
+}
+
+impl Network {
+    /// Refuses numbers that cannot be meant.
+    ///
+    /// # Errors
+    /// [`InvalidValue`] naming what refers to a lidar, surface or target that is not there, or a sigma
+    /// that is not positive.
+    pub fn check(&self) -> Result<(), InvalidValue> {
+        let parts = [
+            self.start.lidars.len(),
+            self.start.surfaces.len(),
+            self.start.targets.len(),
+        ];
+        let wrong = self.known.iter().find(|known| !known.fits(parts));
+        match wrong {
+            None => Ok(()),
+            Some(known) => Err(InvalidValue {
+                name: "known",
+                expected: "lidars, surfaces and targets that are there, positive sigmas".into(),
+                found: format!("{known:?}"),
+            }),
+        }
+    }
+}
+
+/// Everything that comes out.
+#[derive(Debug, Clone)]
+pub struct Adjusted {
+    /// Estimates.
+    pub state: State,
+    /// Where they are in the covariance.
+    pub layout: Layout,
+    /// Joint covariance of the border's unknowns.
+    pub covariance: DMatrix<f64>,
+    /// Rays that met a surface.
+    pub met: Vec<Met>,
+    /// Their residuals, metres, and standard deviations; NaN where a ray was refused.
+    pub residuals: Vec<[f64; 2]>,
+    /// What became of everything known, in the order given.
+    pub judged: Vec<Vec<Judged>>,
+    /// Where those rays ended, world frame, metres.
+    points_m: Vec<Vector3<f64>>,
+    /// Scatter of the channels' offsets as found, metres.
+    pub offset_u_m: f64,
+    /// Steps taken after the last change.
+    pub steps: usize,
+    /// Whether it settled.
+    pub converged: bool,
+}
+
+impl Adjusted {
+    /// Where the rays that met a surface ended, world frame, metres.
+    pub fn points(&self) -> &[Vector3<f64>] {
+        &self.points_m
+    }
+}
+
+/// One row of what was known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// Observed minus adjusted, in its unit.
+    pub residual: f64,
+    /// A-priori standard deviation.
+    pub sigma: f64,
+    /// Share of an error in it that its residual shows: 0 uncontrolled, 1 fully.
+    pub redundancy: f64,
+    /// Residual over its own standard deviation.
+    pub studentised: f64,
+    /// Left out as a gross error.
+    pub left_out: bool,
+}
+
+/// Why there is no adjustment.
+#[derive(Debug, Clone, Error, PartialEq)]
+pub enum NetworkError {
+    /// Nothing to adjust.
+    #[error("no ray of any lidar met a surface: {rays} rays, {surfaces} surfaces")]
+    NothingMet {
+        /// Mean rays of all lidars.
+        rays: usize,
+        /// Surfaces.
+        surfaces: usize,
+    },
+    /// Normal equations without a solution.
+    #[error("the normal equations of {unknowns} unknowns have no solution")]
+    Singular {
+        /// Number of unknowns.
+        unknowns: usize,
+    },
+}
+
+impl Coded for NetworkError {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::NothingMet { .. } => "calibration.nothing_met",
+            Self::Singular { .. } => "calibration.singular",
+        }
+    }
+
+    fn hint(&self) -> Option<String> {
+        Some("check position_m and axes of the lidars against the control points".into())
+    }
+}
+
+/// Adjusts a network.
+///
+/// 1. Rays are given to surfaces and everything is adjusted with smooth surfaces, through ever
+///    narrower gates. 2. The residuals tell the roughness, which joins the unknowns. 3. What was
+///    surveyed wrongly is left out, the worst first, until all the rest agrees.
+///
+/// # Errors
+/// [`NetworkError`] where no surface is seen, or nothing can be solved.
+pub fn adjust(network: &Network) -> Result<Adjusted, NetworkError> {
+    let mut work = Work::new(network);
+    for gate in &GATES {
+        work.select(gate)?;
+        work.settle(Doubt::All)?;
+    }
+    work.roughen();
+    for _ in 0..LEARNING_ROUNDS {
+        let solved = work.settle(Doubt::All)?;
+        work.learn_offsets(&solved);
+        work.roughen();
+    }
+    work.select(&GATES[GATES.len() - 1])?;
+    let mut solved = work.settle(Doubt::Rays)?;
+    while let Some(worst) = work.worst(&solved) {
+        work.left_out[worst] = true;
+        solved = work.settle(Doubt::Rays)?;
+    }
+    Ok(work.finish(solved))
+}
+
+/// Whose large residuals weigh less.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Doubt {
+    All,
+    Rays,
+}
+
+struct Work<'a> {
+    network: &'a Network,
+    state: State,
+    layout: Layout,
+    met: Vec<Met>,
+    left_out: Vec<bool>,
+    offset_u_m: f64,
+    steps: usize,
+    converged: bool,
+}
+
+impl<'a> Work<'a> {
+    fn new(network: &'a Network) -> Self {
+        Self {
+            network,
+            state: network.start.clone(),
+            layout: network.start.layout(),
+            met: Vec::new(),
+            left_out: vec![false; network.known.len()],
+            offset_u_m: network.priors.channel_offset_u_m,
+            steps: 0,
+            converged: false,
+        }
+    }
+
+    fn select(&mut self, gate: &Gate) -> Result<(), NetworkError> {
+        let holds = self.network.holds.iter().enumerate();
+        self.met = holds
+            .flat_map(|(lidar, hold)| select::met(&self.state, hold, lidar, gate))
+            .collect();
+        if self.met.is_empty() {
+            return Err(NetworkError::NothingMet {
+                rays: self.network.holds.iter().map(|h| h.beams.len()).sum(),
+                surfaces: self.state.surfaces.len(),
+            });
+        }
+        Ok(())
+    }
+
+    /// Gauss-Newton until nothing moves.
+    fn settle(&mut self, doubt: Doubt) -> Result<Solved, NetworkError> {
+        self.converged = false;
+        let mut solved = self.solve(doubt)?;
+        for step in 1..=STEPS {
+            self.state
+                .advance(&self.layout, &solved.border, &solved.nodes);
+            self.steps = step;
+            let moved = self.moved(&solved);
+            solved = self.solve(doubt)?;
+            if moved < SETTLED {
+                self.converged = true;
+                break;
+            }
+        }
+        Ok(solved)
+    }
+
+    /// Largest step of a pose over its sigma.
+    fn moved(&self, solved: &Solved) -> f64 {
+        let poses = self
+            .layout
+            .lidars
+            .iter()
+            .flat_map(|at| *at..at + Term::ELEVATION);
+        poses
+            .map(|k| solved.border[k].abs() / solved.covariance[(k, k)].sqrt())
+            .fold(0.0, f64::max)
+    }
+
+    fn solve(&self, doubt: Doubt) -> Result<Solved, NetworkError> {
+        let mut normal = Normal::new(&self.state, &self.layout);
+        for met in &self.met {
+            if let Some(row) = self.ray(met) {
+                normal.add(&row, share(&row));
+            }
+        }
+        for (known, left_out) in self.network.known.iter().zip(&self.left_out) {
+            for row in known.rows(&self.state, &self.layout) {
+                let share = match (left_out, doubt) {
+                    (true, _) => 0.0,
+                    (_, Doubt::All) if known.may_be_wrong() => doubted(&row),
+                    _ => 1.0,
+                };
+                normal.add(&row, share);
+            }
+        }
+        self.hold_priors(&mut normal);
+        normal.solve().ok_or(NetworkError::Singular {
+            unknowns: self.layout.border + self.layout.nodes,
+        })
+    }
+
+    fn ray(&self, met: &Met) -> Option<Row> {
+        let beam = &self.network.holds[met.lidar].beams[met.beam];
+        rows::ray(&self.state, &self.layout, met.lidar, beam, met.surface)
+    }
+
+    fn hold_priors(&self, normal: &mut Normal) {
+        let priors = &self.network.priors;
+        for (lidar, at) in self.state.lidars.iter().zip(&self.layout.lidars) {
+            (0..3).for_each(|k| normal.hold(at + Term::ROTATION + k, 0.0, LOOSE_RAD));
+            (0..3).for_each(|k| normal.hold(at + Term::POSITION + k, 0.0, LOOSE_M));
+            normal.hold(
+                at + Term::ELEVATION,
+                lidar.elevation_rad,
+                priors.elevation_u_rad,
+            );
+            normal.hold(at + Term::SCALE, lidar.scale, priors.range_scale_u);
+            normal.hold_alike(at + Term::OFFSETS, &lidar.offsets_m, self.offset_u_m);
+        }
+        for (surface, at) in self.state.surfaces.iter().zip(&self.layout.surfaces) {
+            (0..3).for_each(|k| normal.hold(at + k, 0.0, LOOSE_M));
+            (3..6).for_each(|k| normal.hold(at + k, surface.coefficients[k], BEND_U_M));
+        }
+        let targets = self.layout.targets.iter().flat_map(|at| *at..at + 3);
+        targets.for_each(|k| normal.hold(k, 0.0, LOOSE_M));
+    }
+
+    /// Takes the scatter of the channels about their lidar's mean from what was found: squares of the
+    /// estimates plus their variances, one step of expectation and maximisation.
+    fn learn_offsets(&mut self, solved: &Solved) {
+        let (mut sum, mut freedom) = (0.0, 0.0);
+        for (lidar, at) in self.state.lidars.iter().zip(&self.layout.lidars) {
+            let count = lidar.offsets_m.len() as f64;
+            let mean = lidar.offsets_m.iter().sum::<f64>() / count;
+            sum += lidar
+                .offsets_m
+                .iter()
+                .map(|c| (c - mean).powi(2))
+                .sum::<f64>();
+            let own = at + Term::OFFSETS;
+            let block = solved
+                .covariance
+                .view((own, own), (lidar.offsets_m.len(), lidar.offsets_m.len()));
+            sum += block.trace() - block.sum() / count;
+            freedom += count - 1.0;
+        }
+        if freedom > 0.0 {
+            let most = self.network.priors.channel_offset_u_m;
+            self.offset_u_m = (sum / freedom)
+                .sqrt()
+                .clamp(LEAST_OFFSET_U_M.min(most), most);
+        }
+    }
+
+    /// Gives every surface the roughness that its residuals show.
+    fn roughen(&mut self) {
+        for surface in 0..self.state.surfaces.len() {
+            let samples = self.samples(surface);
+            let Some(roughness) = variogram::roughness(&samples) else {
+                continue;
+            };
+            let mut places: Vec<_> = samples.iter().map(|s| s.place_m).collect();
+            places.extend(self.network.known.iter().filter_map(|known| match known {
+                Known::Control {
+                    surface: on, xyz_m, ..
+                } if *on == surface => {
+                    let [u, v, _] = self.state.surfaces[surface].frame.local(xyz_m);
+                    Some([u, v])
+                }
+                _ => None,
+            }));
+            if roughness.sigma_m < SMOOTH_M {
+                places.clear();
+            }
+            self.state.surfaces[surface].field = Some(Field::new(roughness, &places));
+        }
+        self.layout = self.state.layout();
+    }
+
+    /// Residual heights of the rays on a surface.
+    fn samples(&self, surface: usize) -> Vec<Sample> {
+        let shape = Surface {
+            field: None, // whatever is not smooth is what is looked for
+            ..self.state.surfaces[surface].clone()
+        };
+        let on = self.met.iter().filter(|met| met.surface == surface);
+        on.filter_map(|met| {
+            self.ray(met).filter(|row| share(row) > 0.0)?;
+            let beam = &self.network.holds[met.lidar].beams[met.beam];
+            let lidar = &self.state.lidars[met.lidar];
+            let point = select::world(lidar, beam);
+            let [u, v, _] = shape.frame.local(&point);
+            let (height_m, gradient, _) = shape.above(&point);
+            let ray = (point - lidar.position_m) / beam.range_m;
+            let cosine = gradient.dot(&ray).abs() / gradient.norm();
+            Some(Sample {
+                place_m: [u, v],
+                height_m,
+                noise_m2: (beam.sigma_m * cosine).powi(2)
+                    + (rows::DIRECTION_U_RAD * beam.range_m).powi(2) * (1.0 - cosine * cosine),
+                group: met.lidar,
+            })
+        })
+        .collect()
+    }
+
+    /// The surveyed value whose residual is the least believable, if it is a gross error.
+    fn worst(&self, solved: &Solved) -> Option<usize> {
+        let judged = (0..self.network.known.len())
+            .filter(|k| self.network.known[*k].may_be_wrong() && !self.left_out[*k])
+            .map(|k| (k, largest(&self.judge(k, solved))));
+        judged
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .filter(|(_, studentised)| *studentised > GROSS)
+            .map(|(k, _)| k)
+    }
+
+    fn judge(&self, known: usize, solved: &Solved) -> Vec<Judged> {
+        let rows = self.network.known[known].rows(&self.state, &self.layout);
+        let left_out = self.left_out[known];
+        rows.iter()
+            .map(|row| judged(row, solved.variance(row), left_out))
+            .collect()
+    }
+
+    fn finish(self, solved: Solved) -> Adjusted {
+        let residuals = self.met.iter().map(|met| match self.ray(met) {
+            Some(row) if share(&row) > 0.0 => [row.residual, row.sigma],
+            _ => [f64::NAN; 2],
+        });
+        let points = self.met.iter().map(|met| {
+            let beam = &self.network.holds[met.lidar].beams[met.beam];
+            select::world(&self.state.lidars[met.lidar], beam)
+        });
+        Adjusted {
+            points_m: points.collect(),
+            residuals: residuals.collect(),
+            judged: (0..self.network.known.len())
+                .map(|k| self.judge(k, &solved))
+                .collect(),
+            covariance: solved.covariance,
+            state: self.state,
+            layout: self.layout,
+            met: self.met,
+            offset_u_m: self.offset_u_m,
+            steps: self.steps,
+            converged: self.converged,
+        }
+    }
+}
+
+fn judged(row: &Row, variance: f64, left_out: bool) -> Judged {
+    let own = row.sigma.powi(2);
+    // Left out, it is predicted by the rest; kept, it has pulled the rest towards itself.
+    let left = if left_out {
+        own + variance
+    } else {
+        (own - variance).max(1e-6 * own)
+    };
+    Judged {
+        residual: row.residual,
+        sigma: row.sigma,
+        redundancy: if left_out { 1.0 } else { left / own },
+        studentised: row.residual / left.sqrt(),
+        left_out,
+    }
+}
+
+fn largest(judged: &[Judged]) -> f64 {
+    judged
+        .iter()
+        .map(|j| j.studentised.abs())
+        .fold(0.0, f64::max)
+}
+
+/// Weight of a ray by its residual: Huber's, and none where something else was hit.
+fn share(row: &Row) -> f64 {
+    match row.residual.abs() / row.sigma {
+        t if t > REFUSED => 0.0,
+        _ => doubted(row),
+    }
+}
+
+fn doubted(row: &Row) -> f64 {
+    (DOUBTED * row.sigma / row.residual.abs()).min(1.0)
+}
