@@ -42,7 +42,7 @@ def test_every_kind_meets_every_level_yard_and_blade() -> None:
 
 @pytest.fixture(scope="module")
 def records() -> list[dict[str, Any]]:
-    return [one.run(case, METHODS, hold_s=1.0) for case in kinds.cases("development", 10)]
+    return [one.run(case, METHODS) for case in kinds.cases("development", 10)]
 
 
 @pytest.mark.slow
