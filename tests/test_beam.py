@@ -82,9 +82,15 @@ def errors(result: Result) -> pl.DataFrame:
     return pl.concat(parts)
 
 
+def hold_means(found: pl.DataFrame) -> pl.DataFrame:
+    """Mean error and uncertainty of every hold and section."""
+    columns = [*"xyz", *(f"ud{axis}_m" for axis in "xyz")]
+    return found.drop_nulls("step").group_by("step", "section").agg(pl.col(columns).mean())
+
+
 def test_holds_are_right_to_millimetres(measured: Result) -> None:
     assert measured.run["method"] == "beam"
-    means = errors(measured).drop_nulls("step").group_by("step", "section").mean()
+    means = hold_means(errors(measured))
     worst = max(float(means[axis].abs().max()) for axis in "xyz")  # type: ignore[arg-type]
     assert worst <= HOLD_M[measured.config.test.id]
 
@@ -97,8 +103,7 @@ def test_single_states_are_right_at_their_own_time(measured: Result) -> None:
 
 
 def test_intervals_hold_the_truth(measured: Result) -> None:
-    loaded = errors(measured).filter(pl.col("load") > 10.0).drop_nulls("step")
-    means = loaded.group_by("step", "section").mean()
+    means = hold_means(errors(measured).filter(pl.col("load") > 10.0))
     for axis in "xyz":
         ratio = (means[axis] / means[f"ud{axis}_m"]).abs().to_numpy()
         assert (ratio < 3.0).all(), (axis, ratio)
