@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect import capture as captures
-from lidar_deflect import channels, comparison, instruments, matching, provenance, steps, tables
+from lidar_deflect import channels, comparison, drift, instruments, matching, provenance, steps, tables
 from lidar_deflect import config as configs
 from lidar_deflect import holds as hold_finder
 from lidar_deflect import wires as wire_lines
@@ -229,6 +229,8 @@ def result_of(
     wires = instruments.wires(opened.config, first_ns, opened.shifts)
     deflection = tabulate.deflection(states, holds, load=opened.load, root=root, first_ns=first_ns)
     health = health_table(opened.capture, inputs.lidars, states)
+    drifted = drift.watch(inputs)
+    watch.lap("drift")
     settings = opened.config.model_dump()
     others = instruments.others(opened.config, first_ns, opened.shifts)
     given = [*([opened.load] if opened.load else []), *wires, *root, *others]
@@ -239,6 +241,7 @@ def result_of(
         "steps": averages,
         **{name: _timed(name, getattr(states, name), first_ns) for name in DETAILS},
         "health": health,
+        "poses": drifted.table,
         "channels": channels.to_table(given, first_ns),
     }
     compared = comparison.configured(
@@ -247,7 +250,7 @@ def result_of(
     if compared.height:
         frames["comparison"] = compared
     watch.lap("tables")
-    run = provenance.run_document(opened, inputs, states, method, health, watch, matches)
+    run = provenance.run_document(opened, inputs, states, method, health, watch, matches, drifted)
     return Result(frames, run, opened.config, inputs.calibration)
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from lidar_deflect.config import Config
+    from lidar_deflect.drift import Drift
     from lidar_deflect.matching import Match
     from lidar_deflect.measurement import Inputs, States
     from lidar_deflect.opened import OpenedTest
@@ -48,6 +49,7 @@ def run_document(
     health: pl.DataFrame,
     watch: Stopwatch,
     matches: Sequence[Match] = (),
+    drifted: Drift | None = None,
 ) -> Mapping[str, Any]:
     """Document of run.json."""
     return {
@@ -63,10 +65,12 @@ def run_document(
             "warnings": list(inputs.calibration.warnings),
         },
         "evidence": states.evidence,
+        "drift": drifted.facts if drifted else {},
         "channel_clocks": [each.facts() for each in matches],
         "warnings": [
             *inputs.calibration.warnings,
             *states.warnings,
+            *(drifted.warnings if drifted else ()),
             *(each.text() for each in matches if each.applied_s),
         ],
         "timings_s": {stage: round(seconds, 3) for stage, seconds in watch.laps.items()},

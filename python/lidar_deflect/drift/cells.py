@@ -1,0 +1,178 @@
+"""Cells of one lidar that lie on static surfaces, and how high above them its echoes are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lidar_deflect.drift.change import Change, estimate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from lidar_deflect.capture import Sweep
+    from lidar_deflect.measurement.unloaded import HoldCloud
+
+    Floats = NDArray[np.float64]
+
+STEP_DEG = 0.5
+"""Echoes are added up in azimuth cells of this size, per channel."""
+
+NEAR_M = 0.4
+"""Cells within this distance of a surface are taken to lie on it."""
+
+GATE_M, GATE_RAD = 0.06, 0.006
+"""Echoes farther from their cell's height (this, and this by the range) are something else."""
+
+MIN_SEEN, MIN_ECHOES, MIN_CELLS = 4, 3, 60
+"""Echoes of a cell in the reference and in a window; cells that a pose can be told from."""
+
+ROUGH = 3.0
+"""Cells that scatter this many times more than the median hold more than one thing."""
+
+FLOOR_M = 5e-4
+"""Added to the scatter of every mean: what does not average out."""
+
+TURN = round(360 / STEP_DEG)
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A static surface: `normal . x = offset_m`, world frame, out to `half_m` of `centre_m`."""
+
+    normal: Floats
+    offset_m: float
+    centre_m: Floats
+    half_m: float
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Static cells of one lidar: all arrays by cell but the last two, which go by plane.
+
+    Attributes
+    ----------
+    plane
+        Number of the plane that a cell lies on, -1 for none.
+    ray_m
+        Mean ray in the reference, world axes, shape (cells, 3).
+    height_m, sigma_m, count
+        Mean height of its echoes above the plane in the reference, their scatter and number.
+    normals
+        Of the planes, world axes, shape (planes, 3).
+    frames
+        Of the planes, sensor frame: normal and offset, shape (planes, 4).
+    """
+
+    plane: NDArray[np.intp]
+    ray_m: Floats
+    height_m: Floats
+    sigma_m: Floats
+    count: NDArray[np.intp]
+    normals: Floats
+    frames: Floats
+
+    @classmethod
+    def of(cls, cloud: HoldCloud, pose: Floats, planes: Sequence[Plane]) -> Cells:
+        """Find the static cells of a reference hold, seen from `pose` (world from sensor)."""
+        key = _keys(cloud)
+        size = (int(key.max(initial=0)) // TURN + 1) * TURN
+        count = np.bincount(key, minlength=size)
+        sums = [np.bincount(key, cloud.xyz[:, k], size) for k in range(3)]
+        ray = (np.stack(sums, axis=1) / np.maximum(count, 1)[:, None]) @ pose[:3, :3].T
+        normals = np.array([plane.normal for plane in planes])
+        offsets = np.array([plane.offset_m for plane in planes]) - normals @ pose[:3, 3]
+        frames = np.hstack([normals @ pose[:3, :3], offsets[:, None]])
+        plane = np.where(count < MIN_SEEN, -1, _plane_of(ray + pose[:3, 3], planes))
+        start = np.zeros(size)
+        cells = cls(plane, ray, start, start, count, normals, frames)
+        for gate_m in (NEAR_M, 0.0):  # about the plane, then about that mean: movers drop out
+            sums_ = Sums(cells, gate_m)
+            sums_.add(cloud)
+            cells = sums_.as_reference()
+        return cells._without_rough()
+
+    def _without_rough(self) -> Cells:
+        """Leave out cells that hold more than one thing."""
+        known = self.sigma_m[self.plane >= 0]
+        limit = ROUGH * float(np.median(known)) if len(known) else 0.0
+        return replace(self, plane=np.where(self.sigma_m > limit, -1, self.plane))
+
+    @property
+    def seen(self) -> int:
+        """How many cells can be watched."""
+        return int((self.plane >= 0).sum())
+
+
+class Sums:
+    """Heights of one window, added up by cell."""
+
+    def __init__(self, cells: Cells, wider_m: float = 0.0) -> None:
+        size = len(cells.plane)
+        self._cells = cells
+        range_m = np.linalg.norm(cells.ray_m, axis=1)
+        self._gate_m = np.maximum(GATE_M + GATE_RAD * range_m, wider_m)
+        self._count = np.zeros(size, dtype=np.intp)
+        self._sum, self._squares = np.zeros(size), np.zeros(size)
+
+    def add(self, echoes: HoldCloud | Sweep) -> None:
+        """Add the echoes of a sweep or of many."""
+        cells, key = self._cells, _keys(echoes)
+        size = len(cells.plane)
+        on = np.flatnonzero(key < size)
+        on = on[cells.plane[key[on]] >= 0]
+        key = key[on]
+        frame = cells.frames[cells.plane[key]]
+        height = np.einsum("ij,ij->i", echoes.xyz[on], frame[:, :3]) - frame[:, 3]
+        away = height - cells.height_m[key]
+        clear = np.abs(away) < self._gate_m[key]
+        key, away = key[clear], away[clear]
+        self._count += np.bincount(key, minlength=size)
+        self._sum += np.bincount(key, away, size)
+        self._squares += np.bincount(key, away * away, size)
+
+    def as_reference(self) -> Cells:
+        """Return the cells with these heights as those of the reference."""
+        count = np.maximum(self._count, 1)
+        mean = self._sum / count
+        spread = np.sqrt(np.maximum(self._squares / count - mean**2, 0.0))
+        plane = np.where(self._count < MIN_SEEN, -1, self._cells.plane)
+        height = self._cells.height_m + mean
+        return replace(
+            self._cells, plane=plane, height_m=height, sigma_m=spread, count=self._count
+        )
+
+    def change(self) -> Change | None:
+        """Change of pose since the reference; None where too few cells were seen."""
+        cells = self._cells
+        seen = np.flatnonzero((self._count >= MIN_ECHOES) & (cells.plane >= 0))
+        if len(seen) < MIN_CELLS:
+            return None
+        typical = float(np.median(cells.sigma_m[seen]))
+        scatter = np.maximum(cells.sigma_m[seen], 0.5 * typical)
+        variance = scatter**2 * (1.0 / self._count[seen] + 1.0 / cells.count[seen])
+        height = self._sum[seen] / self._count[seen]
+        normal = cells.normals[cells.plane[seen]]
+        return estimate(cells.ray_m[seen], normal, height, np.sqrt(variance + FLOOR_M**2))
+
+
+def _keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
+    """Cell of every echo: channel, then azimuth."""
+    step = np.floor(echoes.azimuth_deg / np.float32(STEP_DEG)).astype(np.intp) % TURN
+    return echoes.ring.astype(np.intp) * TURN + step
+
+
+def _plane_of(points_m: Floats, planes: Sequence[Plane]) -> NDArray[np.intp]:
+    """Nearest plane of each point within `NEAR_M` of it, else -1."""
+    away = np.stack([_away(points_m, plane) for plane in planes], axis=1)
+    return np.where(away.min(axis=1) < NEAR_M, away.argmin(axis=1), -1)
+
+
+def _away(points_m: Floats, plane: Plane) -> Floats:
+    height = np.abs(points_m @ plane.normal - plane.offset_m)
+    inside = np.linalg.norm(points_m - plane.centre_m, axis=1) < plane.half_m
+    return np.where(inside, height, np.inf)
