@@ -12,7 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect import capture as captures
-from lidar_deflect import channels, comparison, drift, instruments, matching, provenance, steps, tables
+from lidar_deflect import (
+    channels,
+    comparison,
+    drift,
+    instruments,
+    matching,
+    provenance,
+    steps,
+    tables,
+)
 from lidar_deflect import config as configs
 from lidar_deflect import holds as hold_finder
 from lidar_deflect import wires as wire_lines

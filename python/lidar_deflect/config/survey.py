@@ -50,5 +50,6 @@ class Calibrate(Model):
     )
     range_scale_u: NotNegative = Field(default=1e-4, description="prior sigma of the range scale")
     drift: Literal["follow", "mark"] = Field(
-        default="follow", description="a tripod that moves during the test: follow | mark"
+        default="follow",
+        description="a tripod that moves in the test: mark | follow (as yet marked, too)",
     )

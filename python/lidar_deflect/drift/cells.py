@@ -38,6 +38,8 @@ FLOOR_M = 5e-4
 """Added to the scatter of every mean: what does not average out."""
 
 TURN = round(360 / STEP_DEG)
+MAX_RING = 1023
+"""Channels beyond share their cells, which then are too rough to be watched."""
 
 
 @dataclass(frozen=True)
@@ -142,9 +144,7 @@ class Sums:
         spread = np.sqrt(np.maximum(self._squares / count - mean**2, 0.0))
         plane = np.where(self._count < MIN_SEEN, -1, self._cells.plane)
         height = self._cells.height_m + mean
-        return replace(
-            self._cells, plane=plane, height_m=height, sigma_m=spread, count=self._count
-        )
+        return replace(self._cells, plane=plane, height_m=height, sigma_m=spread, count=self._count)
 
     def change(self) -> Change | None:
         """Change of pose since the reference; None where too few cells were seen."""
@@ -162,8 +162,9 @@ class Sums:
 
 def _keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
     """Cell of every echo: channel, then azimuth."""
-    step = np.floor(echoes.azimuth_deg / np.float32(STEP_DEG)).astype(np.intp) % TURN
-    return echoes.ring.astype(np.intp) * TURN + step
+    azimuth = np.nan_to_num(echoes.azimuth_deg) / np.float32(STEP_DEG)
+    step = np.floor(azimuth).astype(np.intp) % TURN
+    return np.minimum(echoes.ring, MAX_RING).astype(np.intp) * TURN + step
 
 
 def _plane_of(points_m: Floats, planes: Sequence[Plane]) -> NDArray[np.intp]:

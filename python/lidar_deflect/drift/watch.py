@@ -18,11 +18,14 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     import polars as pl
+    from numpy.typing import NDArray
 
     from lidar_deflect.capture import Sweep
     from lidar_deflect.drift.change import Change
     from lidar_deflect.measurement import Inputs
     from lidar_deflect.network import Surface
+
+    Floats = NDArray[np.float64]
 
 WINDOW_NS = 3_000_000_000
 SWEEPS = 10
@@ -34,7 +37,7 @@ MARGIN_M = 15.0
 GROUND_M = 30.0
 """Ground that was not surveyed is watched this far around a lidar."""
 
-_AXES = ("x", "y", "z", "x", "y", "z")
+_PARTS = (("turn_mrad", 0), ("shift_mm", 3))
 
 
 @dataclass(frozen=True)
@@ -105,7 +108,12 @@ def watch(inputs: Inputs) -> Drift:
     return Drift(
         _table(seen, first_ns),
         (*(_said(move) for move in moves), *unseen),
-        {"moved": moves, "not_watched": blind, "window_s": WINDOW_NS * 1e-9},
+        {
+            "moved": moves,
+            "followed": False,
+            "not_watched": blind,
+            "window_s": WINDOW_NS * 1e-9,
+        },
     )
 
 
@@ -180,33 +188,46 @@ def _table(seen: Sequence[Seen], first_ns: int) -> pl.DataFrame:
 def _moves(lidar: str, seen: Sequence[Seen], first_ns: int) -> list[dict[str, Any]]:
     """Return the spans over which one lidar is not where it was calibrated."""
     own = [each for each in seen if each.lidar == lidar]
-    spans = [list(span) for moved, span in groupby(own, lambda each: each.change.moved) if moved]
-    return [_move(span, first_ns) for span in spans]
+    numbers = range(len(own))
+    moved = [list(span) for is_, span in groupby(numbers, lambda k: own[k].change.moved) if is_]
+    return [_move(own, span, first_ns) for span in moved]
 
 
-def _move(span: Sequence[Seen], first_ns: int) -> dict[str, Any]:
+def _move(own: Sequence[Seen], span: Sequence[int], first_ns: int) -> dict[str, Any]:
     """Describe one span; in its first window the lidar may have stood half of the time."""
-    whole = span[1:] or span
-    step = np.median([each.change.step for each in whole], axis=0) * 1e3
-    variances = np.median([np.diag(each.change.covariance) for each in whole], axis=0)
+    whole = [own[k].change for k in (span[1:] or span)]
+    step = np.median([change.step for change in whole], axis=0)
+    variances = np.median([np.diag(change.covariance) for change in whole], axis=0)
+    at_ns = _instant_ns(own[max(0, span[0] - 1) : span[0] + 1], step)
     return {
-        "lidar": span[0].lidar,
-        "from_s": round((span[0].start_ns - first_ns) * 1e-9, 3),
-        "to_s": round((span[-1].stop_ns - first_ns) * 1e-9, 3),
-        "turn_mrad": [round(float(value), 3) for value in step[:3]],
-        "shift_mm": [round(float(value), 2) for value in step[3:]],
-        "u": [round(float(value), 3) for value in np.sqrt(variances) * 1e3],
+        "lidar": own[0].lidar,
+        "at_s": round((at_ns - first_ns) * 1e-9, 1),
+        "until_s": round((own[span[-1]].stop_ns - first_ns) * 1e-9, 1),
+        "turn_mrad": [round(1e3 * float(value), 3) for value in step[:3]],
+        "shift_mm": [round(1e3 * float(value), 2) for value in step[3:]],
+        "u": [round(1e3 * float(value), 3) for value in np.sqrt(variances)],
     }
 
 
+def _instant_ns(windows: Sequence[Seen], step: Floats) -> int:
+    """When a lidar moved by `step`: how much of it the windows around that show tells it."""
+    moved_ns = 0.0
+    for window in windows:
+        weight = np.linalg.solve(window.change.covariance, step)
+        share = float(weight @ window.change.step) / float(weight @ step)
+        moved_ns += min(1.0, max(0.0, share)) * (window.stop_ns - window.start_ns)
+    return max(windows[0].start_ns, windows[-1].stop_ns - round(moved_ns))
+
+
 def _said(move: Mapping[str, Any]) -> str:
-    turn, shift = (float(np.linalg.norm(move[name])) for name in ("turn_mrad", "shift_mm"))
-    parts = [
-        f"{name} {value:+.2f} +/- {2 * u:.2f}"
-        for name, value, u in zip(_AXES, move["turn_mrad"] + move["shift_mm"], move["u"], strict=True)
-    ]
+    turn, shift = (_along(move[name], move["u"][k:]) for name, k in _PARTS)
     return (
-        f"lidar {move['lidar']} moved: between {move['from_s']:.1f} s and {move['to_s']:.1f} s its "
-        f"static surfaces show a turn of {turn:.2f} mrad ({', '.join(parts[:3])}) and a shift of "
-        f"{shift:.1f} mm ({', '.join(parts[3:])}; k = 2); its pose is not corrected for it"
+        f"lidar {move['lidar']} moved at about {move['at_s']:.1f} s: until {move['until_s']:.1f} s "
+        f"its static surfaces show a turn of {turn} mrad and a shift of {shift} mm since the "
+        "reference (world axes, k = 2); what it measured then is not corrected for it"
     )
+
+
+def _along(values: Sequence[float], u: Sequence[float]) -> str:
+    axes = zip("xyz", values, u, strict=False)
+    return ", ".join(f"{axis} {value:+.2f} ± {2 * own:.2f}" for axis, value, own in axes)
