@@ -164,7 +164,7 @@ def _keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
     """Cell of every echo: channel, then azimuth."""
     azimuth = np.nan_to_num(echoes.azimuth_deg) / np.float32(STEP_DEG)
     step = np.floor(azimuth).astype(np.intp) % TURN
-    return np.minimum(echoes.ring, MAX_RING).astype(np.intp) * TURN + step
+    return np.asarray(np.minimum(echoes.ring, MAX_RING).astype(np.intp) * TURN + step)
 
 
 def _plane_of(points_m: Floats, planes: Sequence[Plane]) -> NDArray[np.intp]:

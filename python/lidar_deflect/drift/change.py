@@ -73,11 +73,12 @@ def estimate(ray_m: Floats, normal: Floats, height_m: Floats, sigma_m: Floats) -
     """
     design = -np.hstack([np.cross(ray_m, normal), normal]) / sigma_m[:, None]
     seen = height_m / sigma_m
-    step, normal_matrix, scale = np.zeros(6), np.zeros((6, 6)), 1.0
+    step: Floats = np.zeros(6)
+    normal_matrix: Floats = np.zeros((6, 6))
     for _ in range(ROUNDS):
         left = seen - design @ step
         scale = max(1.0, MAD_TO_SIGMA * float(np.median(np.abs(left))))
         weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-9)) / scale**2
         normal_matrix = (design * weight[:, None]).T @ design + np.diag(PRIOR**-2)
-        step = np.linalg.solve(normal_matrix, (design * weight[:, None]).T @ seen)
-    return Change(step, np.linalg.inv(normal_matrix))
+        step = np.asarray(np.linalg.solve(normal_matrix, (design * weight[:, None]).T @ seen))
+    return Change(step, np.asarray(np.linalg.inv(normal_matrix)))
