@@ -89,15 +89,24 @@ def check_replay(page: Browser) -> None:
     page.wait(f"{picture} !== {json.dumps(before)}")
 
 
-@pytest.fixture(scope="module", params=["edge", "flap"])
+@pytest.fixture(
+    scope="module",
+    params=[
+        ("edge", "paper"),
+        ("flap", "paper"),
+        pytest.param(("edge", "beam"), marks=pytest.mark.slow),
+        pytest.param(("flap", "beam"), marks=pytest.mark.slow),
+    ],
+    ids=lambda each: " ".join(each),
+)
 def scene_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    name = request.param
-    folder = tmp_path_factory.mktemp(name)
+    name, method = request.param
+    folder = tmp_path_factory.mktemp(f"{name}-{method}")
     config = folder / "test.toml"
     config.write_text(
         configuration(name).replace("[prediction]", "[prediction]\ntolerance_percent = 7.0")
     )
-    result = Test.load(config).measure(SCENES / name / "capture.pcap.gz", method="paper")
+    result = Test.load(config).measure(SCENES / name / "capture.pcap.gz", method=method)
     written = result.save(folder / "results")
     for file in ("theory.csv", "wire.csv", "truth.parquet"):
         comparison.save(written, comparison.compare(written, SCENES / name / file))

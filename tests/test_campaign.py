@@ -42,7 +42,7 @@ def test_every_kind_meets_every_level_yard_and_blade() -> None:
 
 @pytest.fixture(scope="module")
 def records() -> list[dict[str, Any]]:
-    return [one.run(case, METHODS, hold_s=1.0) for case in kinds.cases("development", 10)]
+    return [one.run(case, METHODS) for case in kinds.cases("development", 10)]
 
 
 @pytest.mark.slow
@@ -156,8 +156,8 @@ def test_a_test_that_hangs_is_a_failure(tmp_path: Path) -> None:
 
 
 def test_regions_are_judged_by_chi_square() -> None:
-    # Quantiles of tables: 7.815, 12.592, 21.026.
-    for freedom, expected in ((3, 7.815), (6, 12.592), (12, 21.026)):
+    # Quantiles as tables have them.
+    for freedom, expected in ((6, 12.592), (12, 21.026), (24, 36.415)):
         assert table.chi2_95(freedom) == pytest.approx(expected, rel=3e-3)
     random = np.random.default_rng(3)
     mix = random.normal(size=(12, 12)) * np.repeat([1e-4, 5e-3], 6)[:, None]

@@ -56,6 +56,8 @@ class Truth:
 def judge(result: Result, truth: Truth) -> dict[str, Any]:
     """Return the errors of one run: at the largest load step, and of its single states."""
     steps = result.steps
+    if steps["step"].n_unique() < 2:
+        return {"failed": "no_steps", "why": f"load steps found: {steps['step'].n_unique()}, not 2"}
     largest = steps.sort("load")["step"][-1]
     rest = steps.sort("load")["step"][0]
     sections, z_hold, widths, twists = [], [], [], []

@@ -453,6 +453,7 @@ class BeamAdjustment:
     def values(self) -> NDArray[np.float64]: ...
     def layout(self) -> dict[str, int]: ...
 
+@final
 class StaticHold:
     """What one lidar sees while nothing moves: mean rays per channel and azimuth cell."""
 

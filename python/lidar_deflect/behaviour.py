@@ -59,13 +59,22 @@ class Stiffness:
 
 @dataclass(frozen=True)
 class Creep:
-    """Drift along the load over one hold, with the standard uncertainty of its scatter."""
+    """Drift along the load over one hold, with the standard uncertainty of its scatter.
+
+    `is_long` is false where sway fills so much of the hold that its scatter cannot be judged.
+    """
 
     step: str
     section: str
     duration_s: float
     drift_m: float
     u_m: float
+    is_long: bool
+
+    @property
+    def is_beyond(self) -> bool | None:
+        """Whether the drift is beyond its expanded uncertainty; None where nobody can tell."""
+        return abs(self.drift_m) > 2.0 * self.u_m if self.is_long else None
 
 
 def direction(config: Mapping[str, Any], steps: pl.DataFrame) -> Floats | None:
@@ -192,8 +201,8 @@ def creep(steps: pl.DataFrame, deflection: pl.DataFrame, unit: Floats) -> list[C
     return found
 
 
-def _drift(t_s: Floats, value: Floats) -> tuple[float, float, float] | None:
-    """Duration, drift over it and its standard uncertainty; sway counts as correlated noise."""
+def _drift(t_s: Floats, value: Floats) -> tuple[float, float, float, bool] | None:
+    """Duration, drift over it, its standard uncertainty (sway counts as correlated noise)."""
     if t_s.size < _FEWEST_STATES or np.ptp(t_s) <= 0.0:
         return None
     t = t_s - t_s.mean()
@@ -203,7 +212,8 @@ def _drift(t_s: Floats, value: Floats) -> tuple[float, float, float] | None:
     lag = float(off[1:] @ off[:-1]) / max(float(off @ off), 1e-300)
     few = t_s.size * (1.0 - min(max(lag, 0.0), 0.95)) / (1.0 + min(max(lag, 0.0), 0.95))
     span = float(np.ptp(t_s))
-    return span, slope * span, span * float(np.sqrt(variance / (t @ t) * t_s.size / few))
+    u = span * float(np.sqrt(variance / (t @ t) * t_s.size / few))
+    return span, slope * span, u, few >= _FEWEST_STATES
 
 
 def by_section(found: Sequence[Stiffness]) -> dict[str, Stiffness]:

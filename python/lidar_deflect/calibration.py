@@ -138,7 +138,8 @@ class Calibration:
         State of the unloaded blade by measuring method, so that a run without an unloaded hold can
         be measured; empty where none was seen.
     joint
-        Poses and nuisances of all lidars with their joint covariance; None where the method has none.
+        Poses and nuisances of all lidars with their joint covariance; None where the method has
+        none.
     evidence
         What the adjustment as a whole rests on: verdict, surfaces, survey with residuals.
     """

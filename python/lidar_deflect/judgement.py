@@ -46,6 +46,7 @@ def calibration(config: Config, solution: Solution) -> Calibration:
     CalibrationError
         If a direction of a pose is free (``calibration.free``) or two lidars look exchanged.
     """
+    refuse_exchanged(config, solution)
     covariance = solution.covariance
     free = list(_loose(solution.lidars, covariance, FREE_RAD, FREE_M))
     if free:
@@ -55,7 +56,6 @@ def calibration(config: Config, solution: Solution) -> Calibration:
             facts=[(lidar, f"free {direction}") for lidar, direction, _ in free],
             hint=free[0][2],
         )
-    refuse_exchanged(config, solution)
     lidars = [config.lidar(id) for id in solution.lidars]
     poses = tuple(_pose(lidar, solution, number, covariance) for number, lidar in enumerate(lidars))
     warnings = (*_held(solution, covariance), *_left_out(config, solution), *_unsettled(solution))
@@ -102,7 +102,7 @@ def _left_out(config: Config, solution: Solution) -> Iterator[str]:
         worst = max(rows, key=lambda row: abs(row[3]))
         if worst[4]:
             yield (
-                f"{name} was left out: {1e3 * worst[0]:+.0f} mm from where everything else puts it, "
+                f"{name} was left out: {1e3 * worst[0]:+.0f} mm from where all else puts it, "
                 f"{abs(worst[3]):.0f} times its standard deviation; check its coordinates"
             )
 
@@ -116,7 +116,7 @@ def _unsettled(solution: Solution) -> Iterator[str]:
 
 
 def named(config: Config, solution: Solution) -> Iterator[tuple[str, Sequence[tuple[Any, ...]]]]:
-    """Every surveyed value by name, with its rows: residual, sigma, redundancy, studentised, out."""
+    """Name surveyed values, with their rows: residual, sigma, redundancy, studentised, out."""
     used = [s.name for s in solution.surfaces]
     points = [point for point in config.control if point.on in used]
     for number, (point, rows) in enumerate(zip(points, solution.raw["control"], strict=True), 1):

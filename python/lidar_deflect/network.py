@@ -74,8 +74,8 @@ class Solution:
         Everything as the core gives it.
     surfaces
         The surveyed surfaces, in the order of the core.
-    covariance
-        Joint covariance of the poses, shape (6 n, 6 n), order of `lidars`, each wx wy wz tx ty tz.
+    known
+        Everything that was surveyed, by kind, as the core was given it.
     """
 
     lidars: tuple[str, ...]
@@ -88,12 +88,12 @@ class Solution:
 
     @property
     def covariance(self) -> NDArray[np.float64]:
-        """Joint covariance of the poses."""
+        """Joint covariance of the poses, (6 n, 6 n), each wx wy wz tx ty tz."""
         return self._block([range(6)] * len(self.lidars))
 
     @property
     def full_covariance(self) -> NDArray[np.float64]:
-        """Joint covariance of, per lidar, pose, elevation offset, range scale and channel offsets."""
+        """Joint covariance of pose, elevation offset, range scale, channel offsets per lidar."""
         return self._block([range(8 + len(lidar["offsets_m"])) for lidar in self.raw["lidars"]])
 
     def _block(self, terms: Sequence[range]) -> NDArray[np.float64]:
@@ -227,7 +227,7 @@ def _turned_to_walls(
     surfaces: Sequence[Surface],
     beneath_m: float,
 ) -> NDArray[np.float64]:
-    """Turn a levelled lidar about the vertical until the first wall that it sees is in its place."""
+    """Turn a levelled lidar about the vertical until the first wall it sees is in place."""
     beams = hold.beams()
     points = (beams["direction"] * beams["range_m"][:, None]) @ rotation.T
     for wall in surfaces:

@@ -241,7 +241,7 @@ CREEP_CAPTION = (
     "(k = 2) from the scatter, with sway counted as correlated noise. Drift within it is none."
 )
 CREEP_COLUMNS = {"duration": "duration", "drift": "drift", "seen": "beyond scatter"}
-DRIFTS = {True: "yes", False: "no"}
+DRIFTS = {True: "yes", False: "no", None: "too short to tell"}
 NO_LOAD = "No load channel was read: the steps were found in the deflection itself."
 NO_LOADED = "No loaded hold was measured."
 

@@ -19,7 +19,7 @@ HEADER = (
 
 
 def chi2_95(freedom: int) -> float:
-    """Return the 95 % quantile of chi-square (Wilson and Hilferty, to 0.3 % from 3 degrees on)."""
+    """Return the 95 % quantile of chi-square (Wilson and Hilferty, to 0.3 % from 6 degrees on)."""
     spread = 2.0 / (9.0 * freedom)
     return float(freedom * (1.0 - spread + 1.644_854 * np.sqrt(spread)) ** 3)
 

@@ -295,6 +295,7 @@ def _channel_line(part: pl.DataFrame, name: str, k: int) -> go.Scatter:
         x=part["t_s"],
         y=part["value"],
         mode="lines",
+        showlegend=True,
         name=style.text(name),
         line={"color": style.colour(k), "dash": style.dash(k), "width": 1.5},
         connectgaps=False,

@@ -121,7 +121,7 @@ def _creep_table(drifts: list[behaviour.Creep]) -> Table:
                 said(each.section),
                 digits.number(each.duration_s, 1),
                 digits.measured(each.drift_m, each.u_m, scale=1e3, decimals=1),
-                said(words.DRIFTS[abs(each.drift_m) > digits.COVERAGE * each.u_m]),
+                said(words.DRIFTS[each.is_beyond]),
             )
             for each in drifts
             if each.step == step

@@ -46,6 +46,9 @@ fn simulated_sensors() -> Vec<&'static str> {
     WRITERS.iter().map(|writer| writer.id()).collect()
 }
 
+/// Id of the model that reads a sensor's packets, and the files that describe the unit.
+type UnitOut = (&'static str, Vec<(String, Vec<u8>)>);
+
 /// A simulated test under way; writes its capture as it goes.
 #[pyclass(name = "Simulation", module = "lidar_deflect._native")]
 struct PySimulation {
@@ -131,7 +134,7 @@ impl PySimulation {
     }
 
     /// Of each lidar the id of the model that reads it, and the files that describe the unit.
-    fn units(&self) -> Vec<(&'static str, Vec<(String, Vec<u8>)>)> {
+    fn units(&self) -> Vec<UnitOut> {
         let unit = |lidar: &Lidar| {
             let writer = lidar.plan.sensor.writer;
             let files = writer.files().into_iter();

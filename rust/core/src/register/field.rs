@@ -162,6 +162,11 @@ impl Field {
         })
     }
 
+    /// Distance between neighbouring nodes, metres.
+    pub fn spacing_m(&self) -> f64 {
+        self.spacing_m
+    }
+
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.heights_m.len()

@@ -4,6 +4,8 @@
 //! surfaces with their bend and roughness, and targets are found together by robust Gauss-Newton; the
 //! joint covariance of all of it follows from the same normal equations.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{DMatrix, Vector3};
 use thiserror::Error;
 
@@ -60,6 +62,8 @@ const GATES: [Gate; 4] = [
         turn_rad: 0.0005,
     },
 ];
+/// Heights within a square of this side are taken for alike while nothing is known of them, metres.
+const ALIKE_M: f64 = 1.0;
 /// A surface less rough than this is described by its smooth part alone, metres.
 const SMOOTH_M: f64 = 5e-4;
 /// Rounds in which roughness and the scatter of the channels' offsets are learned from what was found.
@@ -227,6 +231,7 @@ struct Work<'a> {
     state: State,
     layout: Layout,
     met: Vec<Met>,
+    alike: Vec<f64>,
     left_out: Vec<bool>,
     offset_u_m: f64,
     steps: usize,
@@ -240,6 +245,7 @@ impl<'a> Work<'a> {
             state: network.start.clone(),
             layout: network.start.layout(),
             met: Vec::new(),
+            alike: Vec::new(),
             left_out: vec![false; network.known.len()],
             offset_u_m: network.priors.channel_offset_u_m,
             steps: 0,
@@ -258,7 +264,28 @@ impl<'a> Work<'a> {
                 surfaces: self.state.surfaces.len(),
             });
         }
+        self.alike = self.alike();
         Ok(())
+    }
+
+    /// How many rays of its lidar each ray shares its place with: what the surface hides there is the
+    /// same for all of them and does not average out.
+    fn alike(&self) -> Vec<f64> {
+        let place = |met: &Met| {
+            let beam = &self.network.holds[met.lidar].beams[met.beam];
+            let point = select::world(&self.state.lidars[met.lidar], beam);
+            let surface = &self.state.surfaces[met.surface];
+            let side_m = surface.field.as_ref().map_or(ALIKE_M, Field::spacing_m);
+            let [u, v, _] = surface.frame.local(&point);
+            let cell = |t: f64| (t / side_m).floor() as i64;
+            (met.lidar, met.surface, cell(u), cell(v))
+        };
+        let places: Vec<_> = self.met.iter().map(place).collect();
+        let mut counts = BTreeMap::new();
+        for place in &places {
+            *counts.entry(*place).or_insert(0.0) += 1.0;
+        }
+        places.iter().map(|place| counts[place]).collect()
     }
 
     /// Gauss-Newton until nothing moves.
@@ -293,8 +320,8 @@ impl<'a> Work<'a> {
 
     fn solve(&self, doubt: Doubt) -> Result<Solved, NetworkError> {
         let mut normal = Normal::new(&self.state, &self.layout);
-        for met in &self.met {
-            if let Some(row) = self.ray(met) {
+        for (met, alike) in self.met.iter().zip(&self.alike) {
+            if let Some(row) = self.ray(met, *alike) {
                 normal.add(&row, share(&row));
             }
         }
@@ -314,9 +341,16 @@ impl<'a> Work<'a> {
         })
     }
 
-    fn ray(&self, met: &Met) -> Option<Row> {
+    fn ray(&self, met: &Met, alike: f64) -> Option<Row> {
         let beam = &self.network.holds[met.lidar].beams[met.beam];
-        rows::ray(&self.state, &self.layout, met.lidar, beam, met.surface)
+        rows::ray(
+            &self.state,
+            &self.layout,
+            met.lidar,
+            beam,
+            met.surface,
+            alike,
+        )
     }
 
     fn hold_priors(&self, normal: &mut Normal) {
@@ -390,6 +424,7 @@ impl<'a> Work<'a> {
             self.state.surfaces[surface].field = Some(Field::new(roughness, &places));
         }
         self.layout = self.state.layout();
+        self.alike = self.alike();
     }
 
     /// Residual heights of the rays on a surface.
@@ -398,9 +433,10 @@ impl<'a> Work<'a> {
             field: None, // whatever is not smooth is what is looked for
             ..self.state.surfaces[surface].clone()
         };
-        let on = self.met.iter().filter(|met| met.surface == surface);
-        on.filter_map(|met| {
-            self.ray(met).filter(|row| share(row) > 0.0)?;
+        let all = self.met.iter().zip(&self.alike);
+        let on = all.filter(|(met, _)| met.surface == surface);
+        on.filter_map(|(met, alike)| {
+            self.ray(met, *alike).filter(|row| share(row) > 0.0)?;
             let beam = &self.network.holds[met.lidar].beams[met.beam];
             let lidar = &self.state.lidars[met.lidar];
             let point = select::world(lidar, beam);
@@ -439,7 +475,8 @@ impl<'a> Work<'a> {
     }
 
     fn finish(self, solved: Solved) -> Adjusted {
-        let residuals = self.met.iter().map(|met| match self.ray(met) {
+        let rays = self.met.iter().zip(&self.alike);
+        let residuals = rays.map(|(met, alike)| match self.ray(met, *alike) {
             Some(row) if share(&row) > 0.0 => [row.residual, row.sigma],
             _ => [f64::NAN; 2],
         });

@@ -63,13 +63,15 @@ pub fn raised(direction: &Unit<Vector3<f64>>, elevation_rad: f64) -> (Vector3<f6
     (turned, up * cosine - direction.into_inner() * sine)
 }
 
-/// A mean ray that met a surface; None where the model's ray meets it nowhere.
+/// A mean ray that met a surface; None where the model's ray meets it nowhere. So many rays as `alike`
+/// share what the surface hides around the place.
 pub fn ray(
     state: &State,
     layout: &Layout,
     lidar: usize,
     beam: &Beam,
     surface: usize,
+    alike: f64,
 ) -> Option<Row> {
     let (of, shape) = (&state.lidars[lidar], &state.surfaces[surface]);
     let offset = of
@@ -92,6 +94,7 @@ pub fn ray(
             meets_m,
             closing.abs() / gradient.norm(),
             &height,
+            alike,
         ),
         ..Row::default()
     };
@@ -116,11 +119,12 @@ fn ray_sigma(
     range_m: f64,
     cosine: f64,
     height: &Height,
+    alike: f64,
 ) -> f64 {
     let tangent = (1.0 - cosine * cosine).max(0.0).sqrt() / cosine;
     let aimed = range_m * DIRECTION_U_RAD * tangent;
     let rough = state.unseen_m(surface, height) / cosine;
-    (beam.sigma_m.powi(2) + aimed.powi(2) + rough.powi(2)).sqrt()
+    (beam.sigma_m.powi(2) + aimed.powi(2) + alike * rough.powi(2)).sqrt()
 }
 
 /// A surveyed point on a surface.

@@ -10,12 +10,12 @@ use super::surface::{Surface, SurfaceFrame};
 /// Rays flatter than this against a surface are left out: roughness hides the ground behind itself.
 const LEAST_COSINE: f64 = 0.05;
 /// Neighbours on the same scan line this far away show how the surface runs, metres.
-const NEIGHBOUR_M: f64 = 0.3;
+const NEIGHBOUR_M: f64 = 0.25;
 /// The scan line may leave the surface by this share of the way to the neighbour, and by this, metres.
 const SLANT: f64 = 0.15;
 const SLANT_M: f64 = 0.03;
 /// Neighbours are looked for over so many azimuth cells.
-const NEIGHBOUR_CELLS: usize = 60;
+const NEIGHBOUR_CELLS: usize = 200;
 /// Nearer to the sensor than this are its own tripod and housing, metres.
 const LEAST_RANGE_M: f64 = 0.5;
 

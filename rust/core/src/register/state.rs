@@ -87,7 +87,7 @@ impl State {
         layout.targets = self.targets.iter().map(|_| next(3)).collect();
         for surface in &self.surfaces {
             layout.fields.push(layout.nodes);
-            layout.nodes += surface.field.as_ref().map_or(0, |field| field.len());
+            layout.nodes += surface.field.as_ref().map_or(0, super::field::Field::len);
         }
         layout
     }

@@ -274,7 +274,7 @@ mod tests {
             check(&|state, layout| known.rows(state, layout));
         }
         check(&|state, layout| {
-            rows::ray(state, layout, 0, &beam(), 0)
+            rows::ray(state, layout, 0, &beam(), 0, 1.0)
                 .into_iter()
                 .collect()
         });
@@ -284,10 +284,10 @@ mod tests {
     fn a_residual_on_the_ray_does_not_reach_the_derivative() {
         let state = state();
         let layout = state.layout();
-        let near = rows::ray(&state, &layout, 0, &beam(), 0).unwrap();
+        let near = rows::ray(&state, &layout, 0, &beam(), 0, 1.0).unwrap();
         let mut farther = beam();
         farther.range_m += 0.03;
-        let far = rows::ray(&state, &layout, 0, &farther, 0).unwrap();
+        let far = rows::ray(&state, &layout, 0, &farther, 0, 1.0).unwrap();
         assert!((far.residual - near.residual - 0.03 * (1.0 + 2e-4)).abs() < 1e-6);
         for (a, b) in near.border.iter().zip(&far.border).filter(|(a, _)| a.0 < 6) {
             assert!((a.1 - b.1).abs() < 1e-6);

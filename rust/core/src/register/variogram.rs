@@ -11,9 +11,7 @@ const SAMPLE: usize = 3000;
 /// Fewer pairs than this say nothing of a bin.
 const LEAST_PAIRS: usize = 200;
 /// Correlation lengths that are tried, metres.
-const LENGTHS_M: [f64; 13] = [
-    0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2, 4.0, 5.0, 6.5,
-];
+const LENGTHS_M: [f64; 10] = [0.4, 0.5, 0.65, 0.8, 1.0, 1.25, 1.6, 2.0, 2.5, 3.2];
 
 /// A residual height: where, how high (metres), and the variance of the noise in it.
 #[derive(Debug, Clone, Copy)]

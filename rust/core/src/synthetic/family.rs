@@ -120,12 +120,12 @@ mod tests {
             let blade = Stations::drawn(80.0, seed);
             assert!((blade.length_m() - 80.0).abs() < 1e-9);
             assert!(blade.s_m.windows(2).all(|pair| pair[1] > pair[0]));
-            assert!(
-                blade
-                    .ei_flap_nm2
-                    .windows(2)
-                    .all(|pair| pair[1] <= pair[0] * 1.001)
-            );
+            // Where the chord widens from the root on, the section may stiffen a little.
+            let steps = blade.ei_flap_nm2.windows(2).zip(&blade.s_m);
+            for (pair, s_m) in steps {
+                let most = if *s_m < 25.0 { 1.25 } else { 1.0 };
+                assert!(pair[1] <= most * pair[0], "{seed} {s_m} {pair:?}");
+            }
             let (root, tip) = (blade.chord_m[0], blade.chord_m[COUNT - 1]);
             assert!(
                 (3.0..4.5).contains(&root) && (0.2..1.0).contains(&tip),
