@@ -7,6 +7,7 @@ docs/method.md for what causes the rest.
 import json
 from pathlib import Path
 
+import numpy as np
 import polars as pl
 import pytest
 
@@ -50,6 +51,14 @@ def errors(result: Result, name: str, section: str) -> pl.DataFrame:
             for a in "xyz"
         ),
     )
+
+
+def _true_m(s_m: float, from_s: float, to_s: float) -> np.ndarray:
+    """Mean true position of a section of `edge` between two moments."""
+    truth = pl.read_parquet(SCENES / "edge" / "truth.parquet").filter(pl.col("s_m") == s_m)
+    t_s = (truth["time"] - truth["time"].min()).dt.total_nanoseconds() * 1e-9
+    within = truth.filter(t_s.is_between(from_s, to_s))
+    return np.array([within[f"{a}_m"].mean() for a in "xyz"])
 
 
 def _means(states: pl.DataFrame, axes: str) -> dict[str, float]:
@@ -99,7 +108,9 @@ def test_the_same_capture_gives_the_same_tables(
 ) -> None:
     path = tmp_path / "edge.toml"
     path.write_text(configuration("edge"))
-    again = ld.Test.load(path).measure(SCENES / "edge" / "capture.pcap.gz", threads=1)
+    again = ld.Test.load(path).measure(
+        SCENES / "edge" / "capture.pcap.gz", method="paper", threads=1
+    )
     assert again.deflection.equals(measured["edge"].deflection)
 
 
@@ -113,13 +124,19 @@ def test_a_run_without_an_unloaded_hold_is_measured_with_a_calibration_of_anothe
     decode(whole, tmp_path / "zero.pcap", stop_s=4.0)
     decode(whole, tmp_path / "loaded.pcap", start_s=17.0)
     test.calibrate(tmp_path / "zero.pcap").save(tmp_path / "calibration.toml")
-    result = test.measure(tmp_path / "loaded.pcap", calibration=tmp_path / "calibration.toml")
+    known = tmp_path / "calibration.toml"
+    result = test.measure(tmp_path / "loaded.pcap", calibration=known, method="paper")
     of_whole = measured["edge"].steps.filter(pl.col("step") == "100 %")
     found = result.steps.filter(pl.col("step") == "100 %")
     # Another choice of intervals of (10), another scatter of the tip: centimetres across, and
     # along the span what a single tip scatters.
     for axis, within_m in (("x", 0.03), ("y", 0.03), ("z", 0.3)):
         assert (found[f"d{axis}_m"] - of_whole[f"d{axis}_m"]).abs().max() < within_m
-    late = test.measure(SCENES / "edge" / "capture.pcap.gz", start_s=17.0)
+    beam = test.measure(tmp_path / "loaded.pcap", calibration=known, method="beam")
+    for row in beam.steps.filter(pl.col("step") == "100 %").iter_rows(named=True):
+        unloaded, loaded = _true_m(row["s_m"], 0.0, 4.0), _true_m(row["s_m"], 18.5, 21.5)
+        found_m = np.array([row["dx_m"], row["dy_m"], row["dz_m"]])
+        assert np.abs(found_m - (loaded - unloaded)).max() < 0.02
+    late = test.measure(SCENES / "edge" / "capture.pcap.gz", start_s=17.0, method="paper")
     assert late.deflection["t_s"].min() > 17.0
     assert late.steps["step"].unique().to_list() == ["100 %"]

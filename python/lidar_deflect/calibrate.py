@@ -31,6 +31,11 @@ NO_DATUM = (
     '(closed_form): list [[control]] points with on = "ground" for the network adjustment'
 )
 
+TARGETS_UNUSED = (
+    "{count} surveyed targets are not used: no target is searched for in the points yet, ground "
+    "and wall points fix the poses"
+)
+
 
 def calibrate(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
     """Register every lidar that is in the clouds, as `[calibrate] method` says.
@@ -43,6 +48,12 @@ def calibrate(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
         If ground or wall of a lidar cannot be found, or a direction of a pose is left free; the
         error names it.
     """
+    found = _by_method(config, clouds)
+    unused = (TARGETS_UNUSED.format(count=len(config.targets)),) if config.targets else ()
+    return replace(found, warnings=(*unused, *found.warnings))
+
+
+def _by_method(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
     if config.calibrate.method == "closed_form":
         return closed_form(config, clouds)
     if not network.can_solve(config):

@@ -26,6 +26,8 @@ STRETCH_NS = 800_000_000
 OVERLAP_NS = 250_000_000
 """... and what of its neighbours helps it."""
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
+FITTING = 0.8
+"""A stretch of which fewer echoes than this share lie on the blade was not found."""
 CHUNK = 48
 """Stretches that are worked on between two looks at Ctrl-C."""
 
@@ -79,7 +81,7 @@ def follow(
         for inside, result in zip(
             part, _between(inputs, expected, solved, s_m, times_ns, part), strict=True
         ):
-            if result is None:
+            if result is None or not _fits(result[2]):
                 continue
             values[inside] = result[0].reshape(len(inside), len(s_m), 4)
             noise[inside] = result[1].reshape(len(inside), len(s_m), 4)
@@ -126,6 +128,12 @@ def _between(
         list(solved.shares),
         list(GATES),
     )
+
+
+def _fits(told: Mapping[str, Any]) -> bool:
+    """Whether most of what met the blade of a stretch lies on it."""
+    counted, rejected = len(told["s_m"]), len(told["rejected"]["s_m"])
+    return counted > FITTING * (counted + rejected)
 
 
 def _count(

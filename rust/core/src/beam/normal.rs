@@ -17,6 +17,52 @@ pub struct Normal {
     pub rows: usize,
     /// Which unknowns are solved for; the others stay as they are.
     pub free: Range<usize>,
+    runs: Runs,
+}
+
+/// One row as stretches of neighbouring unknowns, so that sums over it are sums of vectors.
+#[derive(Debug, Clone, Default)]
+struct Runs {
+    slopes: Vec<f64>,
+    runs: Vec<Run>,
+}
+
+/// Neighbouring unknowns, none twice.
+#[derive(Debug, Clone)]
+struct Run {
+    first: usize,
+    places: Range<usize>, // among the slopes
+}
+
+impl Runs {
+    fn read(&mut self, row: &[(usize, f64)], start: usize) {
+        self.slopes.clear();
+        self.slopes.extend(row.iter().map(|entry| entry.1));
+        self.runs.clear();
+        for (place, (unknown, _)) in row.iter().enumerate() {
+            let unknown = unknown - start;
+            match self.runs.last_mut() {
+                Some(run) if run.first + run.places.len() == unknown => run.places.end += 1,
+                _ => self.runs.push(Run {
+                    first: unknown,
+                    places: place..place + 1,
+                }),
+            }
+        }
+    }
+
+    /// Adds `scaled` times the row, from `place` in run `number` on, to a column.
+    fn add(&self, number: usize, place: usize, scaled: f64, column: &mut [f64]) {
+        let mut skipped = place - self.runs[number].places.start;
+        for run in &self.runs[number..] {
+            let slopes = &self.slopes[run.places.start + skipped..run.places.end];
+            let sums = &mut column[run.first + skipped..][..slopes.len()];
+            for (sum, slope) in sums.iter_mut().zip(slopes) {
+                *sum += scaled * slope;
+            }
+            skipped = 0;
+        }
+    }
 }
 
 impl Normal {
@@ -28,6 +74,7 @@ impl Normal {
             cost: 0.0,
             rows: 0,
             free,
+            runs: Runs::default(),
         }
     }
 
@@ -36,16 +83,16 @@ impl Normal {
         row.sort_unstable_by_key(|entry| entry.0);
         let first = row.partition_point(|entry| entry.0 < self.free.start);
         let last = row.partition_point(|entry| entry.0 < self.free.end);
-        let (row, start) = (&row[first..last], self.free.start);
+        self.runs.read(&row[first..last], self.free.start);
         let count = self.matrix.nrows();
         let values = self.matrix.as_mut_slice();
-        for (place, (column, slope)) in row.iter().enumerate() {
-            let (column, scaled) = (column - start, weight * slope);
-            let column_values = &mut values[column * count..(column + 1) * count];
-            for (unknown, other) in &row[place..] {
-                column_values[*unknown - start] += scaled * other;
+        for (number, run) in self.runs.runs.iter().enumerate() {
+            for (place, column) in run.places.clone().zip(run.first..) {
+                let scaled = weight * self.runs.slopes[place];
+                let below = &mut values[column * count..(column + 1) * count];
+                self.runs.add(number, place, scaled, below);
+                self.right[column] += scaled * residual;
             }
-            self.right[column] += scaled * residual;
         }
         self.cost += weight * residual * residual;
         self.rows += 1;

@@ -166,6 +166,7 @@ impl BeamAdjustment {
     }
 
     /// Values (holds * sections, 4) and joint covariance of x, y, z, twist of the sections.
+    #[allow(clippy::type_complexity)] // the two that Python unpacks
     fn sections<'py>(
         &self,
         py: Python<'py>,
@@ -210,7 +211,7 @@ impl BeamAdjustment {
 
     /// Follows stretches of time (what was seen, span, load at its knots, instants): per stretch the
     /// states (times * sections, 4), their variances from noise, and what became of the data.
-    #[allow(clippy::type_complexity)] // the three that Python unpacks
+    #[allow(clippy::type_complexity, clippy::too_many_arguments)] // keywords of Python, what it unpacks
     fn follow<'py>(
         &self,
         py: Python<'py>,
