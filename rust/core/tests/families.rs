@@ -317,3 +317,14 @@ fn changed_bytes_of_velodyne_are_survived() {
 fn changed_bytes_of_hesai_are_survived() {
     survive("hesai", 2);
 }
+
+#[test]
+fn only_an_atx_numbers_its_frames() {
+    for writer in writers() {
+        let mut sent = packet(&writer, writer.modes[0], 3, |_, _| RawEcho::default());
+        sent.operation = 201;
+        let wanted = (writer.model.id() == "atx").then_some(201);
+        let payload = (writer.encode)(&sent);
+        assert_eq!(writer.model.frame_id(&payload), wanted);
+    }
+}

@@ -19,7 +19,7 @@ use lidar_deflect_core::time::Timestamp;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use still::{START_NS, Seen, Setting, Writer, writers};
+use still::{FRAME_LEN, START_NS, Seen, Setting, Writer, writers};
 
 const MUTATIONS: usize = 100_000;
 
@@ -514,4 +514,17 @@ fn an_em4_without_its_description_is_refused_and_says_how_to_get_one() {
     let error = report.lidars[0].calibration.clone().unwrap_err();
     assert_eq!(error.code(), "beams.missing");
     assert!(error.hint().unwrap().contains("7766"));
+}
+
+#[test]
+fn frames_have_the_number_that_the_packet_tells_where_it_counts() {
+    for writer in writers() {
+        for setting in &writer.settings {
+            let number = 7 * FRAME_LEN + 2;
+            let payload = (setting.encode)(number, &steady);
+            let wanted = (writer.model.id() == "hap").then_some(7);
+            assert_eq!(writer.model.frame_id(&payload), wanted, "{}", setting.name);
+            assert_eq!(writer.model.frame_id(&payload[..20]), None);
+        }
+    }
 }

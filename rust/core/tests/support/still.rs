@@ -119,6 +119,9 @@ fn livox_shots(form: Form, shots: usize, at: At<'_>) -> Vec<Vec<RawPoint>> {
     (0..shots).map(shot).collect()
 }
 
+/// Packets of a frame that a sensor of the second protocol numbers.
+pub const FRAME_LEN: u32 = 5;
+
 fn livox_setting(model: &'static Livox, data_type: u8, name: &'static str) -> Setting {
     let (shots, form) = match model.protocol {
         Protocol::First => sdk1::form(data_type).unwrap(),
@@ -153,6 +156,7 @@ fn livox_setting(model: &'static Livox, data_type: u8, name: &'static str) -> Se
                 time_ns,
                 interval_ns,
                 counter: number.wrapping_add(64_000) as u16,
+                frame: (number / FRAME_LEN) as u8,
                 shots,
             }),
         }

@@ -127,6 +127,11 @@ impl Family for Atx {
         0.0
     }
 
+    /// Starts again after 256 frames.
+    fn frame_id(&self, view: &View<'_>) -> Option<u32> {
+        Some(view.operation().into())
+    }
+
     fn takes_binary(&self, file: &UnitFile) -> bool {
         matches!(dat::version(file), Some((4, 1..=3)))
     }

@@ -90,6 +90,11 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
         self.azimuth_rad(view, block)
     }
 
+    /// Number of the frame, where the sensor counts them.
+    fn frame_id(&self, _view: &View<'_>) -> Option<u32> {
+        None
+    }
+
     /// Whether a file describes a unit, where it is not the maker's text files that do.
     fn takes_binary(&self, _file: &UnitFile) -> bool {
         false
@@ -184,6 +189,10 @@ impl<F: Family> Model for Rotating<F> {
 
     fn counting(&self) -> Counting {
         self.0.counting()
+    }
+
+    fn frame_id(&self, payload: &[u8]) -> Option<u32> {
+        self.0.frame_id(&self.view(payload)?)
     }
 
     fn takes(&self, file: &UnitFile) -> bool {

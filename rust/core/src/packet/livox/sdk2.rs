@@ -14,6 +14,7 @@ mod field {
     pub const INTERVAL: usize = 3; // u16, 0.1 us, from the first point to the last
     pub const POINTS: usize = 5; // u16
     pub const COUNTER: usize = 7; // u16
+    pub const FRAME: usize = 9;
     pub const DATA_TYPE: usize = 10;
     pub const TIME_TYPE: usize = 11;
     pub const TIME: usize = 28; // u64 ns
@@ -63,6 +64,11 @@ pub fn told_step(payload: &[u8]) -> Option<Step> {
     (interval > 0 && points > 1).then(|| Step::new(interval * INTERVAL_NS, points - 1))
 }
 
+/// Number of the frame; starts again after 256 of them.
+pub fn frame(payload: &[u8]) -> Option<u8> {
+    payload.get(field::FRAME).copied()
+}
+
 /// Reads a data packet; `step` is the model's, for packets that do not tell theirs. `None` for anything else.
 pub fn read(payload: &[u8], step: Step) -> Option<Packet<'_>> {
     let data_type = *payload.get(field::DATA_TYPE)?;
@@ -106,6 +112,8 @@ pub struct RawPacket {
     pub interval_ns: i64,
     /// Number of the packet.
     pub counter: u16,
+    /// Number of the frame.
+    pub frame: u8,
     /// Points of the shots.
     pub shots: Vec<Vec<RawPoint>>,
 }
@@ -123,6 +131,7 @@ pub fn encode(packet: &RawPacket) -> Vec<u8> {
     put(&mut bytes, field::INTERVAL, &interval.to_le_bytes());
     put(&mut bytes, field::POINTS, &points.to_le_bytes());
     put(&mut bytes, field::COUNTER, &packet.counter.to_le_bytes());
+    bytes[field::FRAME] = packet.frame;
     bytes[field::DATA_TYPE] = packet.data_type;
     bytes[field::TIME_TYPE] = match packet.sync {
         Sync::Ptp => 1,
@@ -154,6 +163,7 @@ mod tests {
                 time_ns: 1_718_000_000_500_000_123,
                 interval_ns: 475_000,
                 counter: 65_535,
+                frame: 0,
                 shots: vec![Vec::new(); POINTS],
             };
             let bytes = encode(&packet);
@@ -180,6 +190,7 @@ mod tests {
             time_ns: 5,
             interval_ns: 0,
             counter: 0,
+            frame: 0,
             shots: vec![Vec::new(); 7],
         };
         let bytes = encode(&packet);

@@ -52,6 +52,8 @@ pub struct Livox {
     is_told: bool,
     step: Step,
     lines: u16,
+    /// Whether its packets number the frames.
+    counts_frames: bool,
 }
 
 /// 100 000 shots a second.
@@ -80,6 +82,7 @@ const fn first(
         is_told: true,
         step,
         lines,
+        counts_frames: false,
     }
 }
 
@@ -93,6 +96,7 @@ const fn second(id: &'static str, title: &'static str, step: Step, lines: u16) -
         is_told: true,
         step,
         lines,
+        counts_frames: false,
     }
 }
 
@@ -136,7 +140,10 @@ pub static TELE_15: Livox = Livox {
 /// Mid-360: 200 000 shots a second.
 pub static MID_360: Livox = second("mid360", "Livox Mid-360", Step::new(5_000, 1), 4);
 /// HAP: 452 000 shots a second.
-pub static HAP: Livox = second("hap", "Livox HAP", Step::new(250_000, 113), 6);
+pub static HAP: Livox = Livox {
+    counts_frames: true,
+    ..second("hap", "Livox HAP", Step::new(250_000, 113), 6)
+};
 
 impl Livox {
     /// Reads a data packet of this protocol and of a type that the model sends.
@@ -312,6 +319,14 @@ impl Model for Livox {
 
     fn has_rotor(&self) -> bool {
         false
+    }
+
+    /// A Mid-360 leaves the number at 0 in all its packets, and the first protocol has none.
+    fn frame_id(&self, payload: &[u8]) -> Option<u32> {
+        if !self.counts_frames || !self.fits(payload) {
+            return None;
+        }
+        sdk2::frame(payload).map(u32::from)
     }
 
     fn takes(&self, file: &UnitFile) -> bool {
