@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 METHODS = one.known_methods()
 
+# An edgewise and a flapwise test with four VLP-16: what a test of every change can afford.
+PART = 2
+
 
 def test_seeds_are_fixed_and_never_shared() -> None:
     development, verification = (
@@ -42,16 +45,16 @@ def test_every_kind_meets_every_level_yard_and_blade() -> None:
 
 @pytest.fixture(scope="module")
 def records() -> list[dict[str, Any]]:
-    return [one.run(case, METHODS) for case in kinds.cases("development", 10)]
+    return [one.run(case, METHODS) for case in kinds.cases("development", PART)]
 
 
 @pytest.mark.slow
-def test_ten_tests_end_with_a_number_or_a_named_failure(records: list[dict[str, Any]]) -> None:
+def test_its_first_tests_end_with_a_number_or_a_named_failure(records: list[dict[str, Any]]) -> None:
     for record in records:
         assert "failed" not in record.get("calibration", {}), record
         for method, found in record["methods"].items():
             assert not str(found.get("failed", "")).startswith("bug"), (record["id"], method, found)
-    assert sum(summary.hold_mm(record, "paper") is not None for record in records) >= 2
+    assert any(summary.hold_mm(record, "paper") is not None for record in records)
 
 
 @pytest.mark.slow
@@ -59,7 +62,7 @@ def test_ten_tests_end_with_a_number_or_a_named_failure(records: list[dict[str, 
 def test_the_beam_is_better_than_the_paper_by_far(records: list[dict[str, Any]]) -> None:
     row = summary.row("all", records, "beam")
     assert row.hold_mm is not None
-    assert row.hold_mm[0] < 50.0
+    assert row.hold_mm[0] < 15.0
     assert row.ratio is not None
     assert row.ratio > 10.0
 
@@ -69,7 +72,7 @@ def test_the_page_says_that_it_is_simulated_and_when(records: list[dict[str, Any
     text = page.markdown(records, "development", "a command", None)
     assert "comes from simulation" in text
     assert "Written on 20" in text
-    assert "| all | 10 |" in text
+    assert f"| all | {PART} |" in text
 
 
 def truth() -> judge.Truth:
