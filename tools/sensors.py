@@ -6,7 +6,7 @@ from pathlib import Path
 from lidar_deflect._native import sensor_table
 
 PAGE = Path(__file__).parents[1] / "docs" / "sensors.md"
-START = "<!-- table: made by tools/sensors.py from rust/core/src/packet/proof.rs -->"
+START = "<!-- table: made by tools/sensors.py from rust/core/src/packet/proof -->"
 END = "<!-- end of table -->"
 HEADER = ("id", "sensor", "recognised by", "returns", "calibration of the unit", "proven by")
 

@@ -7,7 +7,9 @@ mod families;
 use families::{Writer, packet, unit_files, writers};
 use lidar_deflect_core::cloud::{Return, ReturnKind};
 use lidar_deflect_core::packet::echoes::RawEcho;
-use lidar_deflect_core::packet::{Decoded, MODELS, Place, ReturnMode, claimants};
+use lidar_deflect_core::packet::hesai::qt128;
+use lidar_deflect_core::packet::unit::UnitFile;
+use lidar_deflect_core::packet::{Decoded, MODELS, Model, Place, ReturnMode, claimants};
 use lidar_deflect_core::time::Timestamp;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
@@ -327,4 +329,71 @@ fn only_an_atx_numbers_its_frames() {
         let payload = (writer.encode)(&sent);
         assert_eq!(writer.model.frame_id(&payload), wanted);
     }
+}
+
+/// A firing a block; block 0 is of the first loop, block 1 of the second.
+fn qt128_single(channels: usize, echo: impl Fn(usize, usize) -> RawEcho) -> Vec<u8> {
+    let writer = writers().into_iter().find(|w| w.model.id() == "qt128");
+    let writer = Writer {
+        size: (2, channels),
+        ..writer.unwrap()
+    };
+    qt128::writer(channels).encode(&packet(&writer, ReturnMode::Last, 5, echo))
+}
+
+fn qt128_returns(payload: &[u8], files: &[UnitFile]) -> (Vec<Return>, Decoded) {
+    let mut out = Decoded::default();
+    let place = Place {
+        time: Timestamp(qt128::QT128.head(payload).unwrap().device_ns),
+        packet: 0,
+        mean_rate_rad_per_ns: 0.0,
+    };
+    let mut decoder = qt128::QT128.fit(files).unwrap().decoder;
+    decoder.decode(payload, place, &mut out);
+    (out.cloud.iter().collect(), out)
+}
+
+/// Laser of a channel of each loop.
+fn chosen(block: usize, channel: usize) -> usize {
+    if block == 0 { 127 - channel } else { channel }
+}
+
+fn chosen_file() -> UnitFile {
+    let row = |channel| format!("{},{}\n", chosen(0, channel) + 1, chosen(1, channel) + 1);
+    let rows: String = (0..80).map(row).collect();
+    let head = "EEFF,1,1\nLaserNum,80,BlockNum,2\nLoop1,Loop2\n";
+    UnitFile::new("channels.csv", format!("{head}{rows}3142432,,,\n"))
+}
+
+#[test]
+fn a_choice_of_lasers_gives_the_points_that_all_lasers_give() {
+    let echo = |block: usize, laser: usize| RawEcho {
+        range: (2_000 + 300 * block + laser) as u16,
+        intensity: laser as u8,
+    };
+    let (all, _) = qt128_returns(&qt128_single(128, echo), &[]);
+    let payload = qt128_single(80, |block, channel| echo(block, chosen(block, channel)));
+    assert!(claimants(&payload).any(|model| model.id() == "qt128"));
+    let (found, _) = qt128_returns(&payload, &[chosen_file()]);
+    assert_eq!(found.len(), 160);
+    for (place, point) in found.iter().enumerate() {
+        let (block, laser) = (place / 80, chosen(place / 80, place % 80));
+        assert_eq!(*point, all[128 * block + laser]);
+        assert_eq!(usize::from(point.ring), laser);
+    }
+}
+
+#[test]
+fn a_choice_that_nothing_tells_gives_no_points_and_says_so() {
+    let echo = |_, _| RawEcho {
+        range: 2_000,
+        intensity: 1,
+    };
+    let payload = qt128_single(80, echo);
+    let (found, out) = qt128_returns(&payload, &[]);
+    assert_eq!((found.len(), out.drops.count("channels_unknown")), (0, 2));
+    assert!(qt128::QT128.remarks(&payload)[0].contains("80 channels"));
+    assert!(qt128::QT128.remarks(&qt128_single(128, echo)).is_empty());
+    let (found, _) = qt128_returns(&qt128_single(79, echo), &[chosen_file()]);
+    assert!(found.is_empty());
 }

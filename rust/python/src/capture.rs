@@ -183,7 +183,7 @@ fn sensor_id(name: &str) -> Option<&'static str> {
 /// files of a unit, proof.
 #[pyfunction]
 fn sensor_table() -> Vec<[String; 6]> {
-    let rows = packet::proof::ROWS.iter();
+    let rows = packet::proof::rows();
     rows.map(|row| {
         let title = packet::model(row.id).map_or(row.id, |model| model.title());
         let texts = [row.id, title, row.recognised, row.returns, row.unit];

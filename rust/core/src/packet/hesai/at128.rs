@@ -232,6 +232,7 @@ impl Fields {
         let elevation_rad = self.elevation_rad[channel] + adjust(&self.elevation_adjust_rad);
         let delay_ns = NOMINAL.fire("fire")?[channel].unwrap_or(0.0);
         Some(Ray {
+            laser: channel,
             azimuth_rad,
             azimuth: azimuth_rad.sin_cos(),
             elevation: elevation_rad.sin_cos(),

@@ -227,6 +227,7 @@ impl Angles {
             + self.azimuth_rad[usize::from(frame.is_odd)].get(channel)?
             + delay_ns * frame.shift_rad_per_ns;
         Some(Ray {
+            laser: channel,
             azimuth_rad,
             azimuth: azimuth_rad.sin_cos(),
             elevation: *self.elevation.get(channel)?,

@@ -4,6 +4,7 @@
 
 pub mod at128;
 pub mod atx;
+pub mod channels;
 mod dat;
 pub mod date;
 pub mod ft120;

@@ -1,5 +1,7 @@
 //! QT128C2X (protocol 3.2): two loops of lasers take turns.
 //!
+//! A unit may be told to send a choice of its lasers; the maker's file of channels says which.
+//!
 //! Source: its manual and the maker's development kit.
 
 use std::sync::LazyLock;
@@ -9,7 +11,8 @@ use super::rotating::{Family, Rotating};
 use super::unit::Unit;
 use crate::packet::ReturnMode;
 
-const CHANNELS: usize = 128;
+/// Lasers of the model, and most channels of a block.
+pub const LASERS: usize = 128;
 const BLOCKS: usize = 2;
 /// Time of the first firing after the packet's, and from one to the next.
 const FIRST_NS: i64 = 9_000;
@@ -38,22 +41,33 @@ static UNIT: LazyLock<Unit> =
     LazyLock::new(|| Unit::built_in("qt128", include_str!("tables/qt128.csv")));
 
 /// QT128C2X.
-pub static QT128: Rotating<Qt128> = Rotating(Qt128);
+pub static QT128: Rotating<Qt128> = writer(LASERS);
 
 /// The model.
 #[derive(Debug, Clone, Copy)]
-pub struct Qt128;
+pub struct Qt128 {
+    /// Channels of the blocks that it writes; it reads any number.
+    channels: usize,
+}
 
-/// Layout of a packet with this header.
-fn layout(header: &Header) -> Layout {
+/// The model, which writes packets of a choice of `channels` lasers.
+pub const fn writer(channels: usize) -> Rotating<Qt128> {
+    Rotating(Qt128 { channels })
+}
+
+/// The flag that other models have for light: channels are a choice, as the maker's kit has it.
+const CHOICE: u8 = flag::LIGHT;
+
+/// Layout of a packet with this header; the flag of a choice may bring a byte of light or none.
+fn layout(header: &Header, has_light: bool) -> Layout {
     let option = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
-    let echo_len = header.echo_len();
-    let block_len = 2 + echo_len * CHANNELS;
+    let echo_len = header.echo_len() - usize::from(header.has(CHOICE) && !has_light);
+    let block_len = 2 + echo_len * header.lasers;
     let tail = HEADER_LEN + BLOCKS * block_len + CRC_LEN + option(flag::SAFETY, SAFETY_LEN);
     let end = tail + TAIL_LEN + option(flag::SEQUENCE, SEQUENCE_LEN) + CRC_LEN;
     Layout {
         blocks: BLOCKS,
-        channels: CHANNELS,
+        channels: header.lasers,
         body: HEADER_LEN,
         block_len,
         azimuth: 0,
@@ -78,10 +92,12 @@ impl Family for Qt128 {
 
     fn layout(&self, payload: &[u8]) -> Option<Layout> {
         let header = Header::new(payload)?;
-        let is_own =
-            header.protocol == (3, 2) && (header.lasers, header.blocks) == (CHANNELS, BLOCKS);
-        let layout = layout(&header);
-        (is_own && payload.len() == layout.len).then_some(layout)
+        let is_own = header.protocol == (3, 2)
+            && header.blocks == BLOCKS
+            && (1..=LASERS).contains(&header.lasers);
+        let sizes = [false, true].map(|has_light| layout(&header, has_light));
+        let found = sizes.into_iter().find(|layout| layout.len == payload.len());
+        found.filter(|_| is_own)
     }
 
     fn nominal(&self) -> &'static Unit {
@@ -106,17 +122,36 @@ impl Family for Qt128 {
         (usize::from(is_second), usize::from(is_second))
     }
 
+    /// Blocks that are not of all lasers, or that say so.
+    fn chosen_loop(&self, view: &View<'_>, block: usize) -> Option<usize> {
+        let is_choice = view.header().is_some_and(|header| header.has(CHOICE));
+        let is_part = view.layout().channels < LASERS;
+        (is_choice || is_part).then(|| self.fire_times(view, block).0)
+    }
+
+    fn remarks(&self, view: &View<'_>) -> Vec<String> {
+        let channels = view.layout().channels;
+        let remark = || {
+            format!(
+                "blocks of {channels} channels: only the sensor's channel configuration file tells which of its \
+                 lasers they are, and without it they give no points: --beams ADDRESS=FILE"
+            )
+        };
+        (channels < LASERS).then(remark).into_iter().collect()
+    }
+
     fn template(&self) -> Vec<u8> {
+        let choice = if self.channels < LASERS { CHOICE } else { 0 };
         let header = Header {
             protocol: (3, 2),
             version: 0,
-            lasers: CHANNELS,
+            lasers: self.channels,
             blocks: BLOCKS,
             unit_mm: 4,
             returns: 1,
-            flags: flag::SEQUENCE | flag::SAFETY | flag::SIGNATURE | flag::CONFIDENCE,
+            flags: flag::SEQUENCE | flag::SAFETY | flag::SIGNATURE | flag::CONFIDENCE | choice,
         };
-        let mut bytes = vec![0; layout(&header).len];
+        let mut bytes = vec![0; layout(&header, false).len];
         header.write(&mut bytes);
         bytes
     }

@@ -7,6 +7,7 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt::Debug;
 
+use super::channels::Channels;
 use super::layout::{Layout, RawPacket, View, write};
 use super::unit::{self, Kind, Unit};
 use crate::cloud::Return;
@@ -49,6 +50,16 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
     /// Numbers of the firing times of a block, for far and for near targets.
     fn fire_times(&self, _view: &View<'_>, _block: usize) -> (usize, usize) {
         (0, 0)
+    }
+
+    /// Number of the loop of a block whose channels are those of the unit's file of channels, where it has one.
+    fn chosen_loop(&self, _view: &View<'_>, _block: usize) -> Option<usize> {
+        None
+    }
+
+    /// What a data packet tells beside its points that a user should know.
+    fn remarks(&self, _view: &View<'_>) -> Vec<String> {
+        Vec::new()
     }
 
     /// Targets nearer than this have the firing times for near ones.
@@ -151,6 +162,11 @@ impl<F: Family> Model for Rotating<F> {
         Misfit { why, may_be: None }
     }
 
+    fn remarks(&self, payload: &[u8]) -> Vec<String> {
+        let view = self.view(payload);
+        view.map_or_else(Vec::new, |view| self.0.remarks(&view))
+    }
+
     fn head(&self, payload: &[u8]) -> Option<Head> {
         let view = self.view(payload)?;
         let rate_rad_per_ns = self.0.rate_rad_per_ns(&view);
@@ -206,7 +222,6 @@ impl<F: Family> Model for Rotating<F> {
                 .clone()
                 .with(std::slice::from_ref(file))
                 .is_ok(),
-            // Packets of all 128 channels do not need it; it does no harm.
             Some(Kind::Channels) => self.0.nominal().fire("loop2").is_some(),
             None => self.0.takes_binary(file),
         }
@@ -217,8 +232,9 @@ impl<F: Family> Model for Rotating<F> {
             return fitted;
         }
         let (unit, calibration) = self.0.nominal().clone().with(files)?;
+        let channels = Channels::find(files, unit.elevation_rad.len())?;
         Ok(Fitted {
-            decoder: Box::new(RotatingDecoder::new(self.0, &unit)),
+            decoder: Box::new(RotatingDecoder::new(self.0, &unit, channels)),
             calibration,
         })
     }
@@ -272,20 +288,21 @@ struct RotatingDecoder<F> {
     elevation: Vec<(f64, f64)>,
     delays_ns: Vec<Vec<f64>>,
     aims: Vec<Aims>,
+    channels: Option<Channels>,
 }
 
 impl<F: Family> RotatingDecoder<F> {
-    fn new(family: F, unit: &Unit) -> Self {
-        let channels = unit.elevation_rad.len();
+    fn new(family: F, unit: &Unit, channels: Option<Channels>) -> Self {
+        let lasers = unit.elevation_rad.len();
         let times = unit.fire_times.iter();
         let times = times.map(|(_, times)| times.iter().map(|ns| ns.unwrap_or(0.0)).collect());
         let mut delays_ns: Vec<Vec<f64>> = times.collect();
         if delays_ns.is_empty() {
-            delays_ns.push(vec![0.0; channels]);
+            delays_ns.push(vec![0.0; lasers]);
         }
         let never = Aims {
             rpm: f64::NAN,
-            aims: vec![Aim::default(); channels],
+            aims: vec![Aim::default(); lasers],
         };
         Self {
             family,
@@ -297,6 +314,20 @@ impl<F: Family> RotatingDecoder<F> {
                 .collect(),
             aims: vec![never; delays_ns.len()],
             delays_ns,
+            channels,
+        }
+    }
+
+    /// Lasers of the channels of a firing; `None` where nothing tells them.
+    fn lasers(&self, view: &View<'_>, first: usize) -> Option<Lasers<'_>> {
+        let channels = view.layout().channels;
+        let told = self.family.chosen_loop(view, first).and_then(|number| {
+            let known = self.channels.as_ref()?;
+            known.of(number, channels)
+        });
+        match told {
+            Some(lasers) => Some(Lasers::Chosen(lasers)),
+            None => (channels == self.elevation.len()).then_some(Lasers::All),
         }
     }
 
@@ -327,6 +358,11 @@ impl<F: Family> RotatingDecoder<F> {
         };
         let (far, near) = self.family.fire_times(view, first);
         let [far, near] = [far, near].map(|table| self.aim(table, view.rpm()));
+        let Some(lasers) = self.lasers(view, first) else {
+            return out
+                .drops
+                .add("channels_unknown", view.return_mode().returns() as u64);
+        };
         let (head, near_m) = (block_rad.sin_cos(), self.family.near_m());
         let firing = Firing {
             first,
@@ -337,20 +373,43 @@ impl<F: Family> RotatingDecoder<F> {
         };
         firing.place(view, out, |channel, range_m| {
             let table = if range_m < near_m { near } else { far };
-            let aim = self.aims[table].aims.get(channel)?;
+            let laser = lasers.of(channel)?;
+            let aim = self.aims[table].aims.get(laser)?;
             Some(Ray {
+                laser,
                 azimuth_rad: block_rad + aim.azimuth_rad,
                 azimuth: add(head, aim.sin_cos),
-                elevation: self.elevation[channel],
+                elevation: self.elevation[laser],
                 delay_ns: aim.delay_ns,
             })
         });
     }
 }
 
+/// Lasers of the channels of a block.
+#[derive(Debug, Clone, Copy)]
+enum Lasers<'a> {
+    /// All, in their order.
+    All,
+    /// A choice of them.
+    Chosen(&'a [usize]),
+}
+
+impl Lasers<'_> {
+    #[inline]
+    fn of(self, channel: usize) -> Option<usize> {
+        match self {
+            Self::All => Some(channel),
+            Self::Chosen(lasers) => lasers.get(channel).copied(),
+        }
+    }
+}
+
 /// Where a shot goes and when, after its firing.
 #[derive(Debug, Clone, Copy)]
 pub struct Ray {
+    /// Number of the laser, 0-based.
+    pub laser: usize,
     /// Azimuth, not far outside of one turn.
     pub azimuth_rad: f64,
     /// Its sine and cosine.
@@ -402,7 +461,7 @@ impl Firing {
                     time: self.time + ray.delay_ns,
                     range_m: range_m as f32,
                     azimuth_rad: wrapped(ray.azimuth_rad),
-                    ring: channel as u16,
+                    ring: ray.laser as u16,
                     intensity: echo.intensity.into(),
                     return_index: number as u8,
                     return_kind,

@@ -1,0 +1,135 @@
+//! Rows of Ouster.
+
+use super::{Proof, Row, row};
+
+/// The models.
+pub static ROWS: &[Row] = &[
+    row(
+        "ouster",
+        "columns that follow each other in time and number; with its metadata by size, serial number and start number as well",
+        "as the metadata say: one, two",
+        "metadata JSON, flat or nested; without it no points",
+        Proof::RealPackets(
+            "ouster-sdk 1.0.1 on five captures (OS0, OS1, OS2; legacy, single, dual, low-data and safety profiles; two sensors on one port): every point within 0.01 mm + float32; RGB, zone and five-word profiles round trip only",
+        ),
+    ),
+    row(
+        "os0",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os1",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os2",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "osdome",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RoundTrip,
+    ),
+    row(
+        "os0-32",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RealPackets("ouster-sdk 1.0.1, every point within 0.01 mm + float32"),
+    ),
+    row(
+        "os0-64",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os0-128",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RealPackets("ouster-sdk 1.0.1, every point within 0.01 mm + float32"),
+    ),
+    row(
+        "os1-16",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os1-32",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RealPackets("ouster-sdk 1.0.1, every point within 0.01 mm + float32"),
+    ),
+    row(
+        "os1-64",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RealPackets("ouster-sdk 1.0.1, every point within 0.01 mm + float32"),
+    ),
+    row(
+        "os1-128",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os2-32",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os2-64",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::Sibling("ouster"),
+    ),
+    row(
+        "os2-128",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RealPackets("ouster-sdk 1.0.1, every point within 0.01 mm + float32"),
+    ),
+    row(
+        "osdome-32",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RoundTrip,
+    ),
+    row(
+        "osdome-64",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RoundTrip,
+    ),
+    row(
+        "osdome-128",
+        "as `ouster`, found through its metadata",
+        "as `ouster`",
+        "as `ouster`",
+        Proof::RoundTrip,
+    ),
+];
