@@ -49,7 +49,9 @@ def records() -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-def test_its_first_tests_end_with_a_number_or_a_named_failure(records: list[dict[str, Any]]) -> None:
+def test_its_first_tests_end_with_a_number_or_a_named_failure(
+    records: list[dict[str, Any]],
+) -> None:
     for record in records:
         assert "failed" not in record.get("calibration", {}), record
         for method, found in record["methods"].items():
