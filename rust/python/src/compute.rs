@@ -1,10 +1,16 @@
 //! The one way into long computations: without the interpreter lock, on a pool of their own.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
 use pyo3::prelude::*;
 use rayon::ThreadPoolBuilder;
 
 use crate::error::BorderResult;
 use lidar_deflect_core::error::InvalidValue;
+
+/// From one look for Ctrl-C to the next.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Runs `work` without the interpreter lock on `threads` threads (`None`: all processors), then
 /// lets a pending Ctrl-C through.
@@ -26,6 +32,29 @@ pub fn compute<T: Send>(
     let result = py.detach(|| pool.install(work));
     py.check_signals()?;
     Ok(result)
+}
+
+/// Runs `work` on a thread of its own without the interpreter lock; on Ctrl-C its flag is set, and
+/// it is to return soon.
+pub fn interruptible<T: Send>(
+    py: Python<'_>,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> BorderResult<T> {
+    let stop = AtomicBool::new(false);
+    let (result, signal) = std::thread::scope(|scope| {
+        let worker = scope.spawn(|| work(&stop));
+        let mut signal = Ok(());
+        while !worker.is_finished() {
+            py.detach(|| std::thread::sleep(LOOK));
+            if signal.is_ok() {
+                signal = py.check_signals();
+                stop.store(signal.is_err(), Ordering::Relaxed);
+            }
+        }
+        (worker.join(), signal)
+    });
+    signal?;
+    Ok(result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
 }
 
 fn checked_threads(threads: Option<usize>) -> Result<usize, InvalidValue> {

@@ -5,6 +5,7 @@
 //! joint covariance of all of it follows from the same normal equations.
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, Vector3};
 use thiserror::Error;
@@ -175,6 +176,9 @@ pub enum NetworkError {
         /// Number of unknowns.
         unknowns: usize,
     },
+    /// Somebody asked for it.
+    #[error("the adjustment was stopped")]
+    Stopped,
 }
 
 impl Coded for NetworkError {
@@ -182,6 +186,7 @@ impl Coded for NetworkError {
         match self {
             Self::NothingMet { .. } => "calibration.nothing_met",
             Self::Singular { .. } => "calibration.singular",
+            Self::Stopped => "calibration.stopped",
         }
     }
 
@@ -196,10 +201,12 @@ impl Coded for NetworkError {
 ///    narrower gates. 2. The residuals tell the roughness, which joins the unknowns. 3. What was
 ///    surveyed wrongly is left out, the worst first, until all the rest agrees.
 ///
+/// `stop` is looked at before every solution, so that a long adjustment can be given up.
+///
 /// # Errors
-/// [`NetworkError`] where no surface is seen, or nothing can be solved.
-pub fn adjust(network: &Network) -> Result<Adjusted, NetworkError> {
-    let mut work = Work::new(network);
+/// [`NetworkError`] where no surface is seen, nothing can be solved, or it was stopped.
+pub fn adjust(network: &Network, stop: &AtomicBool) -> Result<Adjusted, NetworkError> {
+    let mut work = Work::new(network, stop);
     for gate in &GATES {
         work.select(gate)?;
         work.settle(Doubt::All)?;
@@ -228,6 +235,7 @@ enum Doubt {
 
 struct Work<'a> {
     network: &'a Network,
+    stop: &'a AtomicBool,
     state: State,
     layout: Layout,
     met: Vec<Met>,
@@ -239,9 +247,10 @@ struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    fn new(network: &'a Network) -> Self {
+    fn new(network: &'a Network, stop: &'a AtomicBool) -> Self {
         Self {
             network,
+            stop,
             state: network.start.clone(),
             layout: network.start.layout(),
             met: Vec::new(),
@@ -319,6 +328,9 @@ impl<'a> Work<'a> {
     }
 
     fn solve(&self, doubt: Doubt) -> Result<Solved, NetworkError> {
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(NetworkError::Stopped);
+        }
         let mut normal = Normal::new(&self.state, &self.layout);
         for (met, alike) in self.met.iter().zip(&self.alike) {
             if let Some(row) = self.ray(met, *alike) {

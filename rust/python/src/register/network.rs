@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
 use crate::arrays;
-use crate::compute::compute;
+use crate::compute::{compute, interruptible};
 use crate::error::BorderResult;
 
 /// What one lidar sees while nothing moves: mean rays per channel and azimuth cell.
@@ -271,7 +271,7 @@ fn adjust_network<'py>(
     };
     network.check()?;
     drop(holds);
-    let adjusted = compute(py, Some(1), || network::adjust(&network))??;
+    let adjusted = interruptible(py, |stop| network::adjust(&network, stop))??;
     Ok(described(py, &adjusted, &known.kinds())?)
 }
 
