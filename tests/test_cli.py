@@ -197,6 +197,7 @@ def test_units_become_changes_of_the_configuration(
     path.write_text(EVERY_KEY.read_text(encoding="utf-8"), encoding="utf-8")
     for name in ("blade", "contours", "angle", "wire", "root", "load", "theory", "a"):
         (tmp_path / f"{name}.csv").touch()
+    (tmp_path / "strain.tdms").touch()
     changes = units.overrides(path, None, ["192.168.1.201=vlp16", "L2=vlp16-hires"], ["L2=a.csv"])
     lidars = config.load(path, changes).lidars
     assert [lidar.model for lidar in lidars] == ["vlp16", "vlp16-hires"]
