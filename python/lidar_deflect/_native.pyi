@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 __all__ = [
     "BeamAdjustment",
     "BeamBlade",
+    "BeamFeed",
     "BeamSeen",
     "CaptureScan",
     "ContourCurves",
@@ -26,7 +27,6 @@ __all__ = [
     "__version__",
     "adjust_network",
     "arc_length",
-    "beam_seen",
     "check_captures",
     "curve_distances",
     "curve_points",
@@ -396,16 +396,21 @@ class BeamBlade:
 class BeamSeen:
     def __len__(self) -> int: ...
 
-def beam_seen(
-    scan: CaptureScan,
-    *,
-    lidars: Sequence[int],
-    poses: NDArray[np.float64],
-    cut_azimuth_deg: Sequence[float],
-    box_m: NDArray[np.float64],
-    windows_ns: Sequence[tuple[int, int]],
-    progress: Callable[[int, int], None] | None = None,
-) -> list[BeamSeen]: ...
+@final
+class BeamFeed:
+    def __new__(
+        cls,
+        scan: CaptureScan,
+        *,
+        lidars: Sequence[int],
+        poses: NDArray[np.float64],
+        cut_azimuth_deg: Sequence[float],
+        box_m: NDArray[np.float64],
+        windows_ns: Sequence[tuple[int, int]],
+    ) -> BeamFeed: ...
+    def take(
+        self, count: int, progress: Callable[[int, int], None] | None = None
+    ) -> list[BeamSeen]: ...
 
 @final
 class BeamAdjustment:

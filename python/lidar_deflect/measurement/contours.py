@@ -66,17 +66,14 @@ def contours_of(inputs: Inputs, plan: Plan) -> ContourRun:
 
 def _frame_plan(inputs: Inputs, plan: Plan) -> _native.FramePlan:
     """Return what both passes need to make frames out of a capture."""
-    period_ns = round(1e9 / inputs.rate_hz)
-    # The first state is the first multiple of the period after the first packet.
-    first_ns = (inputs.start_ns // period_ns + 1) * period_ns
     return _native.FramePlan(
         inputs.capture.native,
         lidars=inputs.capture.numbers(inputs.lidars),
-        poses=np.array([inputs.calibration.pose(x).world_from_sensor for x in inputs.lidars]),
-        cut_azimuth_deg=[plan.cut_azimuth_deg[lidar] for lidar in inputs.lidars],
+        poses=inputs.poses,
+        cut_azimuth_deg=plan.cuts_deg(inputs.lidars),
         box_m=np.ascontiguousarray(plan.box_m),
-        first_ns=first_ns,
-        period_ns=period_ns,
+        first_ns=inputs.first_ns,
+        period_ns=inputs.period_ns,
         start_ns=inputs.start_ns,
         stop_ns=inputs.stop_ns,
     )

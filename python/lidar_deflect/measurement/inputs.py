@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+
+    from numpy.typing import NDArray
 
     from lidar_deflect.calibration import Calibration
     from lidar_deflect.capture import Capture
@@ -51,6 +55,21 @@ class Inputs:
     load: Channel | None = None
     progress: Progress | None = None
     threads: int | None = None
+
+    @property
+    def period_ns(self) -> int:
+        """From state to state."""
+        return round(1e9 / self.rate_hz)
+
+    @property
+    def first_ns(self) -> int:
+        """The first state: the first multiple of the period after the start."""
+        return (self.start_ns // self.period_ns + 1) * self.period_ns
+
+    @property
+    def poses(self) -> NDArray[np.float64]:
+        """World from sensor of every lidar, shape (lidars, 4, 4)."""
+        return np.array([self.calibration.pose(id).world_from_sensor for id in self.lidars])
 
     def listener(self, stage: str) -> Callable[[int, int], None] | None:
         """Return who is told the progress of one stage, or None where nobody listens."""

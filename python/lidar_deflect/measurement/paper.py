@@ -15,7 +15,7 @@ from lidar_deflect.measurement.contours import ContourRun, contours_of
 from lidar_deflect.measurement.plan import Plan, make_plan
 from lidar_deflect.measurement.plane import choose_plane
 from lidar_deflect.measurement.reference import Reference, reference_of
-from lidar_deflect.measurement.states import MISSING, States
+from lidar_deflect.measurement.states import MISSING, States, joined_names
 from lidar_deflect.measurement.status import (
     extrapolate,
     grade_frames,
@@ -115,11 +115,7 @@ def _per_section(points: NDArray[np.uint32], status: NDArray[np.uint8]) -> NDArr
 def _names(
     lidars: Sequence[str], used: NDArray[np.bool_], status: NDArray[np.uint8]
 ) -> NDArray[np.object_]:
-    joined = np.array(
-        ["+".join(name for name, uses in zip(lidars, row, strict=True) if uses) for row in used],
-        dtype=object,
-    )
-    return np.where(status == MISSING, "", joined[:, None])
+    return np.where(status == MISSING, "", joined_names(lidars, used)[:, None])
 
 
 def _blade_line(inputs: Inputs, contours: ContourRun, reference: Reference) -> Mapping[str, Any]:

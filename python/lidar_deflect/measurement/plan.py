@@ -12,7 +12,7 @@ from lidar_deflect.errors import MeasurementError
 from lidar_deflect.registration import UP
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -66,6 +66,10 @@ class Plan:
     cut_azimuth_deg: Mapping[str, float]
     edge_on_above: bool
     warnings: tuple[str, ...]
+
+    def cuts_deg(self, lidars: Sequence[str]) -> list[float]:
+        """Return where the sweeps of these lidars are cut, in their order."""
+        return [self.cut_azimuth_deg[lidar] for lidar in lidars]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain document for files."""

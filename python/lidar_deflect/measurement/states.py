@@ -18,6 +18,12 @@ if TYPE_CHECKING:
 OK, DEGRADED, INTERPOLATED, EXTRAPOLATED, MISSING = range(5)
 
 
+def joined_names(lidars: Sequence[str], used: NDArray[np.bool_]) -> NDArray[np.object_]:
+    """Names such as ``L1+L3`` of the lidars that were used, shape (t,), from marks (t, lidars)."""
+    rows = ["+".join(name for name, uses in zip(lidars, row, strict=True) if uses) for row in used]
+    return np.array(rows, dtype=object)
+
+
 @dataclass(frozen=True)
 class States:
     """Positions of material sections over time, world frame, metres.

@@ -10,6 +10,7 @@ use pyo3::prelude::*;
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<blade::BeamBlade>()?;
     module.add_class::<seen::BeamSeen>()?;
+    module.add_class::<seen::BeamFeed>()?;
     module.add_class::<adjustment::BeamAdjustment>()?;
-    module.add_function(wrap_pyfunction!(seen::beam_seen, module)?)
+    Ok(())
 }

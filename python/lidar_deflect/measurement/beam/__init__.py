@@ -17,7 +17,7 @@ from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
-from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States
+from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States, joined_names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -72,7 +72,9 @@ def measure(inputs: Inputs) -> States:
         n_points=np.repeat(followed.used.sum(axis=1)[:, None], len(sections), axis=1).astype(
             np.uint32
         ),
-        lidars=_names(inputs, followed, len(sections)),
+        lidars=np.repeat(
+            joined_names(inputs.lidars, followed.used > 0)[:, None], len(sections), axis=1
+        ),
         status=np.repeat(status[:, None], len(sections), axis=1),
         reason=np.repeat(reason[:, None], len(sections), axis=1),
         blade_points=followed.used,
@@ -92,10 +94,7 @@ def measure(inputs: Inputs) -> States:
 
 def moments(inputs: Inputs) -> NDArray[np.int64]:
     """Moments of the states: multiples of the period within the limits."""
-    period_ns = round(1e9 / inputs.rate_hz)
-    first = inputs.start_ns // period_ns + 1
-    last = inputs.stop_ns // period_ns
-    return np.arange(first, last + 1, dtype=np.int64) * period_ns
+    return np.arange(inputs.first_ns, inputs.stop_ns + 1, inputs.period_ns, dtype=np.int64)
 
 
 def _reference(
@@ -150,14 +149,6 @@ def _grades(followed: Followed) -> tuple[NDArray[np.uint8], NDArray[np.object_]]
     lost = np.isnan(followed.values).any(axis=(1, 2))
     status[lost], reason[lost] = MISSING, "ill_posed"
     return status, reason
-
-
-def _names(inputs: Inputs, followed: Followed, sections: int) -> NDArray[np.object_]:
-    rows = [
-        "+".join(name for name, count in zip(inputs.lidars, row, strict=True) if count)
-        for row in followed.used
-    ]
-    return np.repeat(np.array(rows, dtype=object)[:, None], sections, axis=1)
 
 
 def _contour(

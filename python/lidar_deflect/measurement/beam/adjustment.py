@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from lidar_deflect.holds import Hold
     from lidar_deflect.measurement.beam.expected import Expected
     from lidar_deflect.measurement.inputs import Inputs
+    from lidar_deflect.measurement.plan import Plan
 
     Floats = NDArray[np.float64]
 
@@ -36,12 +37,12 @@ SEEN_SHARE = 0.45
 ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
 
-FAR = ((6.0, 5.0), (6.0, 5.0), (4.0, 3.0))
-"""The same before them where no drawing tells the prebend."""
 LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
 BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
 ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
 """Gates of echoes along and of edges across the ray, metres, while the blade is being found."""
+FAR = ((6.0, 5.0), (6.0, 5.0), (4.0, 3.0))
+"""The same before them where no drawing tells the prebend."""
 LAST = (0.05, 0.05)
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
@@ -67,6 +68,8 @@ class Solved:
         Steps it took.
     source
         Where the blade's shape began: ``drawing`` or ``generic``.
+    plan
+        Where the blade is looked for.
     """
 
     native: _native.BeamAdjustment
@@ -76,6 +79,7 @@ class Solved:
     told: Mapping[str, Any]
     steps: int
     source: str
+    plan: Plan
 
 
 def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
@@ -89,18 +93,26 @@ def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[in
     return spans
 
 
-def seen_in(inputs: Inputs, windows_ns: Sequence[tuple[int, int]]) -> list[_native.BeamSeen]:
-    """Read what the lidars saw of the blade in each window."""
-    plan = paper.plan_of(inputs)
-    return _native.beam_seen(
+def reading(inputs: Inputs, plan: Plan, windows_ns: Sequence[tuple[int, int]]) -> _native.BeamFeed:
+    """Read what the lidars saw of the blade, window by window in the order of their starts."""
+    return _native.BeamFeed(
         inputs.capture.native,
         lidars=inputs.capture.numbers(inputs.lidars),
-        poses=np.array([inputs.calibration.pose(x).world_from_sensor for x in inputs.lidars]),
-        cut_azimuth_deg=[plan.cut_azimuth_deg[lidar] for lidar in inputs.lidars],
+        poses=inputs.poses,
+        cut_azimuth_deg=plan.cuts_deg(inputs.lidars),
         box_m=np.ascontiguousarray(plan.box_m),
         windows_ns=list(windows_ns),
-        progress=inputs.listener("read"),
     )
+
+
+def _seen_in(
+    inputs: Inputs, plan: Plan, spans_ns: Sequence[tuple[int, int]]
+) -> list[_native.BeamSeen]:
+    """Return what was seen in spans that may come in any order."""
+    order = sorted(range(len(spans_ns)), key=lambda place: spans_ns[place])
+    feed = reading(inputs, plan, [spans_ns[place] for place in order])
+    found = dict(zip(order, feed.take(len(order), inputs.listener("read")), strict=True))
+    return [found[place] for place in range(len(order))]
 
 
 def solve(inputs: Inputs, expected: Expected) -> Solved:
@@ -124,15 +136,17 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     holds, spans = tuple(holds[i] for i in order), tuple(spans[i] for i in order)
     shares = tuple(shares[i] for i in order)
     drawing = drawing_of(inputs)
-    native = _started(inputs, drawing, expected, spans, shares)
+    plan = paper.plan_of(inputs)
+    native = _started(inputs, drawing, expected, _seen_in(inputs, plan, spans), spans, shares)
     told, steps = _settle(native, inputs, is_far=drawing.source == "generic")
-    return Solved(native, holds, spans, shares, told, steps, drawing.source)
+    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan)
 
 
 def _started(
     inputs: Inputs,
     drawing: Drawing,
     expected: Expected,
+    seen: Sequence[_native.BeamSeen],
     spans: Sequence[tuple[int, int]],
     shares: Sequence[float],
 ) -> _native.BeamAdjustment:
@@ -149,7 +163,7 @@ def _started(
     rig = rig_prior(inputs)
     return _native.BeamAdjustment(
         drawing.blade,
-        seen_in(inputs, spans),
+        seen,
         spans_ns=list(spans),
         forces_n=np.array(shares)[:, None, None] * full_n,
         full_n=full_n,

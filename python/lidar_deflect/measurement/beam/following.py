@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect.measurement.beam.adjustment import LAST, seen_in
+from lidar_deflect.measurement.beam.adjustment import LAST, reading
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
+    from lidar_deflect._native import BeamSeen
     from lidar_deflect.measurement.beam.adjustment import Solved
     from lidar_deflect.measurement.beam.expected import Expected
     from lidar_deflect.measurement.inputs import Inputs
@@ -76,11 +77,14 @@ def follow(
         points.append(told)
     listener = inputs.listener("measure")
     stretches = _stretches(times_ns, in_hold)
+    spans = [_span(times_ns, inside) for inside in stretches]
+    feed = reading(inputs, solved.plan, spans)
     for start in range(0, len(stretches), CHUNK):
         part = stretches[start : start + CHUNK]
-        for inside, result in zip(
-            part, _between(inputs, expected, solved, s_m, times_ns, part), strict=True
-        ):
+        seen = feed.take(len(part), inputs.listener("read"))
+        moments = [times_ns[inside] for inside in part]
+        states = _between(expected, solved, s_m, seen, spans[start : start + CHUNK], moments)
+        for inside, result in zip(part, states, strict=True):
             if result is None or not _fits(result[2]):
                 continue
             values[inside] = result[0].reshape(len(inside), len(s_m), 4)
@@ -106,24 +110,24 @@ def _stretches(times_ns: Times, in_hold: NDArray[np.int64]) -> list[NDArray[np.i
     return np.split(between, breaks[1:])
 
 
+def _span(times_ns: Times, inside: NDArray[np.intp]) -> tuple[int, int]:
+    return int(times_ns[inside[0]]) - OVERLAP_NS, int(times_ns[inside[-1]]) + OVERLAP_NS
+
+
 def _between(
-    inputs: Inputs,
     expected: Expected,
     solved: Solved,
     s_m: Floats,
-    times_ns: Times,
-    stretches: Sequence[NDArray[np.intp]],
+    seen: Sequence[BeamSeen],
+    spans: Sequence[tuple[int, int]],
+    moments: Sequence[Times],
 ) -> list[Any]:
-    spans = [
-        (int(times_ns[inside[0]]) - OVERLAP_NS, int(times_ns[inside[-1]]) + OVERLAP_NS)
-        for inside in stretches
-    ]
     native = solved.native
     return native.follow(
-        seen_in(inputs, spans),
+        seen,
         spans,
         [expected.at(native.load_knots(span)).tolist() for span in spans],
-        [times_ns[inside].tolist() for inside in stretches],
+        [times_ns.tolist() for times_ns in moments],
         s_m.tolist(),
         list(solved.shares),
         list(GATES),

@@ -1,5 +1,7 @@
 //! Sweeps of all lidars sorted into holds: scan lines inside the box, with their ends.
 
+use std::collections::VecDeque;
+
 use nalgebra::{Point3, Vector3};
 
 use super::echoes::{LineEcho, Seen, add_line};
@@ -7,38 +9,54 @@ use crate::frame::WorldFromSensor;
 use crate::paper::passthrough::PassThrough;
 use crate::sweep::Sweep;
 
-/// Collects what is seen of the blade in given stretches of time.
+/// A window no longer waits for a lidar that is so far behind the others: it has fallen silent.
+const PATIENCE_NS: i64 = 60_000_000_000;
+
+/// Collects what is seen of the blade in given stretches of time, each handed over when it is complete.
 #[derive(Debug)]
 pub struct Gather {
     poses: Vec<WorldFromSensor>,
     pass: PassThrough,
-    windows_ns: Vec<(i64, i64)>,
-    seen: Vec<Seen>,
+    open: VecDeque<Window>,
+    /// Start of the last sweep of each lidar.
+    reached_ns: Vec<i64>,
+    has_ended: bool,
+}
+
+#[derive(Debug)]
+struct Window {
+    span_ns: (i64, i64),
+    seen: Seen,
 }
 
 impl Gather {
-    /// For lidars with these poses, points inside the box, and windows in time order.
-    pub fn new(
-        poses: Vec<WorldFromSensor>,
-        pass: PassThrough,
-        windows_ns: Vec<(i64, i64)>,
-    ) -> Self {
-        let seen = vec![Seen::default(); windows_ns.len()];
+    /// For lidars with these poses, points inside the box, and windows in the order of their starts.
+    pub fn new(poses: Vec<WorldFromSensor>, pass: PassThrough, windows_ns: &[(i64, i64)]) -> Self {
+        let window = |span_ns: &(i64, i64)| Window {
+            span_ns: *span_ns,
+            seen: Seen::default(),
+        };
         Self {
+            reached_ns: vec![i64::MIN; poses.len()],
             poses,
             pass,
-            windows_ns,
-            seen,
+            open: windows_ns.iter().map(window).collect(),
+            has_ended: false,
         }
     }
 
-    /// Takes a sweep of a lidar by its number among the poses.
+    /// Takes the next sweep of a lidar by its number among the poses.
     pub fn push(&mut self, sweep: &Sweep) {
-        for (window, seen) in self.windows_ns.iter().zip(&mut self.seen) {
-            if sweep.end.0 < window.0 || sweep.start.0 > window.1 {
+        self.reached_ns[sweep.lidar] = sweep.start.0;
+        for window in &mut self.open {
+            if window.span_ns.0 > sweep.end.0 {
+                break; // so do all that follow
+            }
+            if sweep.start.0 > window.span_ns.1 {
                 continue;
             }
-            for (ring, line) in lines(sweep, &self.poses[sweep.lidar], &self.pass, *window) {
+            let pose = &self.poses[sweep.lidar];
+            for (ring, line) in lines(sweep, pose, &self.pass, window.span_ns) {
                 let is_gap = |from: i64, to: i64| {
                     sweep
                         .gaps
@@ -46,14 +64,33 @@ impl Gather {
                         .any(|gap| gap.from.0 <= to && from <= gap.to.0)
                 };
                 let period_ns = shot_period_ns(&line);
-                add_line(seen, sweep.lidar, ring, &line, period_ns, is_gap);
+                add_line(
+                    &mut window.seen,
+                    sweep.lidar,
+                    ring,
+                    &line,
+                    period_ns,
+                    is_gap,
+                );
             }
         }
     }
 
-    /// What was seen, by window.
-    pub fn finish(self) -> Vec<Seen> {
-        self.seen
+    /// No more sweeps will come.
+    pub fn finish(&mut self) {
+        self.has_ended = true;
+    }
+
+    /// What was seen in the next window, once no lidar has more to say of it.
+    pub fn pop(&mut self) -> Option<Seen> {
+        let end_ns = self.open.front()?.span_ns.1;
+        let slowest = self.reached_ns.iter().min()?;
+        let fastest = self.reached_ns.iter().max()?;
+        let is_past = *slowest > end_ns || *fastest > end_ns.saturating_add(PATIENCE_NS);
+        (is_past || self.has_ended)
+            .then(|| self.open.pop_front())
+            .flatten()
+            .map(|window| window.seen)
     }
 }
 
@@ -101,4 +138,55 @@ fn shot_period_ns(line: &[LineEcho]) -> f64 {
     let middle = steps.len() / 2;
     let (_, median, _) = steps.select_nth_unstable(middle);
     (*median).max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cloud::PointCloud;
+    use crate::time::Timestamp;
+    use nalgebra::Rotation3;
+
+    const SECOND: i64 = 1_000_000_000;
+
+    fn gather(windows: &[(i64, i64)]) -> Gather {
+        let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::zeros());
+        let pass = PassThrough::new([-1.0; 3], [1.0; 3]).unwrap();
+        Gather::new(vec![pose; 2], pass, windows)
+    }
+
+    fn sweep(lidar: usize, start: i64) -> Sweep {
+        Sweep {
+            lidar,
+            index: 0,
+            cloud: PointCloud::default(),
+            start: Timestamp(start),
+            end: Timestamp(start + 100),
+            coverage: 1.0,
+            packets: 1,
+            lost: 0,
+            gaps: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn a_window_waits_until_all_lidars_are_past_it() {
+        let mut gather = gather(&[(0, 1000), (500, 2000)]);
+        gather.push(&sweep(0, 1500));
+        assert!(gather.pop().is_none());
+        gather.push(&sweep(1, 1001));
+        assert!(gather.pop().is_some());
+        assert!(gather.pop().is_none());
+        gather.finish();
+        assert!(gather.pop().is_some() && gather.pop().is_none());
+    }
+
+    #[test]
+    fn a_silent_lidar_does_not_hold_up_the_others_for_ever() {
+        let mut gather = gather(&[(0, SECOND)]);
+        gather.push(&sweep(0, 2 * SECOND));
+        assert!(gather.pop().is_none());
+        gather.push(&sweep(0, 2 * SECOND + PATIENCE_NS));
+        assert!(gather.pop().is_some());
+    }
 }

@@ -45,14 +45,13 @@ impl FramePlan {
     }
 
     fn options(&self, place: usize) -> SweepOptions {
-        let number = self.lidars[place];
-        let mut cuts = vec![0.0; number + 1];
-        cuts[number] = self.cut_azimuth_rad[place];
         SweepOptions {
-            lidars: Some(vec![number]),
-            cut_azimuth_rad: cuts,
             start: Some(self.start),
             stop: Some(self.stop),
+            ..SweepOptions::of(
+                &self.lidars[place..=place],
+                &self.cut_azimuth_rad[place..=place],
+            )
         }
     }
 }

@@ -29,6 +29,21 @@ pub struct SweepOptions {
     pub stop: Option<Timestamp>,
 }
 
+impl SweepOptions {
+    /// Whole sweeps of some lidars, each cut at its own azimuth.
+    pub fn of(lidars: &[usize], cuts_rad: &[f64]) -> Self {
+        let mut by_number = vec![0.0; lidars.iter().max().map_or(0, |last| last + 1)];
+        for (number, cut_rad) in lidars.iter().zip(cuts_rad) {
+            by_number[*number] = *cut_rad;
+        }
+        Self {
+            lidars: Some(lidars.to_vec()),
+            cut_azimuth_rad: by_number,
+            ..Self::default()
+        }
+    }
+}
+
 /// Takes the returns of one lidar in order and makes something of them.
 pub trait Sink {
     /// Where all lidars' results are gathered.

@@ -32,39 +32,87 @@ impl BeamSeen {
     }
 }
 
-/// Reads what lidars (numbers in the scan) with poses (lidars, 4, 4) saw inside of a box (2, 3) in
-/// each of the windows, in time order.
-#[pyfunction]
-#[pyo3(signature = (scan, *, lidars, poses, cut_azimuth_deg, box_m, windows_ns, progress=None))]
-#[allow(clippy::too_many_arguments)] // keywords of Python
-pub fn beam_seen(
-    py: Python<'_>,
-    scan: &CaptureScan,
+/// Reads a capture once and tells what its lidars saw in one window after the other.
+#[pyclass(module = "lidar_deflect._native")]
+pub struct BeamFeed {
+    feed: Feed,
+    reader: SweepReader,
+    gather: Gather,
     lidars: Vec<usize>,
-    poses: PyReadonlyArray3<'_, f64>,
-    cut_azimuth_deg: Vec<f64>,
-    box_m: PyReadonlyArray2<'_, f64>,
-    windows_ns: Vec<(i64, i64)>,
-    progress: Option<Py<PyAny>>,
-) -> BorderResult<Vec<BeamSeen>> {
-    let corners = arrays::points("box_m", &box_m)?;
-    arrays::expect_rows("box_m", corners.len(), 2)?;
-    let matrices = arrays::matrices("poses", &poses, lidars.len())?;
-    let poses: Result<Vec<_>, _> = matrices.iter().map(WorldFromSensor::from_matrix).collect();
-    let pass = PassThrough::new(corners[0], corners[1])?;
-    let options = SweepOptions {
-        lidars: Some(lidars.clone()),
-        cut_azimuth_rad: cuts(&lidars, &cut_azimuth_deg),
-        start: windows_ns.iter().map(|w| Timestamp(w.0)).min(),
-        stop: windows_ns.iter().map(|w| Timestamp(w.1)).max(),
-    };
-    let mut gather = Gather::new(poses?, pass, windows_ns);
-    let mut feed = Feed::open(py, &scan.paths)?;
-    let mut reader = SweepReader::new(&scan.report, &options)?;
-    loop {
-        let more = feed.block(py, progress.as_ref(), |datagram| {
+    has_ended: bool,
+}
+
+#[pymethods]
+impl BeamFeed {
+    /// For lidars (numbers in the scan) with poses (lidars, 4, 4), inside of a box (2, 3), in windows
+    /// in the order of their starts.
+    #[new]
+    #[pyo3(signature = (scan, *, lidars, poses, cut_azimuth_deg, box_m, windows_ns))]
+    #[allow(clippy::too_many_arguments)] // keywords of Python
+    fn new(
+        py: Python<'_>,
+        scan: &CaptureScan,
+        lidars: Vec<usize>,
+        poses: PyReadonlyArray3<'_, f64>,
+        cut_azimuth_deg: Vec<f64>,
+        box_m: PyReadonlyArray2<'_, f64>,
+        windows_ns: Vec<(i64, i64)>,
+    ) -> BorderResult<Self> {
+        let corners = arrays::points("box_m", &box_m)?;
+        arrays::expect_rows("box_m", corners.len(), 2)?;
+        let matrices = arrays::matrices("poses", &poses, lidars.len())?;
+        let poses: Result<Vec<_>, _> = matrices.iter().map(WorldFromSensor::from_matrix).collect();
+        let pass = PassThrough::new(corners[0], corners[1])?;
+        let cuts_rad: Vec<f64> = cut_azimuth_deg.into_iter().map(f64::to_radians).collect();
+        let options = SweepOptions {
+            start: windows_ns.iter().map(|w| Timestamp(w.0)).min(),
+            stop: windows_ns.iter().map(|w| Timestamp(w.1)).max(),
+            ..SweepOptions::of(&lidars, &cuts_rad)
+        };
+        Ok(Self {
+            feed: Feed::open(py, &scan.paths)?,
+            reader: SweepReader::new(&scan.report, &options)?,
+            gather: Gather::new(poses?, pass, &windows_ns),
+            lidars,
+            has_ended: false,
+        })
+    }
+
+    /// What was seen in the next `count` windows; fewer at the end.
+    #[pyo3(signature = (count, progress=None))]
+    fn take(
+        &mut self,
+        py: Python<'_>,
+        count: usize,
+        progress: Option<Py<PyAny>>,
+    ) -> BorderResult<Vec<BeamSeen>> {
+        let mut windows = Vec::with_capacity(count);
+        loop {
+            while windows.len() < count
+                && let Some(seen) = self.gather.pop()
+            {
+                windows.push(BeamSeen { seen });
+            }
+            if windows.len() == count || self.has_ended {
+                return Ok(windows);
+            }
+            self.read_on(py, progress.as_ref())?;
+        }
+    }
+}
+
+impl BeamFeed {
+    fn read_on(&mut self, py: Python<'_>, progress: Option<&Py<PyAny>>) -> BorderResult<()> {
+        let Self {
+            feed,
+            reader,
+            gather,
+            lidars,
+            ..
+        } = self;
+        let more = feed.block(py, progress, |datagram| {
             reader.push(datagram);
-            take(&mut reader, &mut gather, &lidars);
+            hand_over(reader, gather, lidars);
             if reader.is_done() {
                 Want::Stop
             } else {
@@ -72,21 +120,18 @@ pub fn beam_seen(
             }
         })?;
         if !more || reader.is_done() {
-            break;
+            py.detach(|| {
+                reader.finish();
+                hand_over(reader, gather, lidars);
+                gather.finish();
+            });
+            self.has_ended = true;
         }
+        Ok(())
     }
-    py.detach(|| {
-        reader.finish();
-        take(&mut reader, &mut gather, &lidars);
-    });
-    Ok(gather
-        .finish()
-        .into_iter()
-        .map(|seen| BeamSeen { seen })
-        .collect())
 }
 
-fn take(reader: &mut SweepReader, gather: &mut Gather, lidars: &[usize]) {
+fn hand_over(reader: &mut SweepReader, gather: &mut Gather, lidars: &[usize]) {
     while let Some(mut sweep) = reader.pop() {
         let number = sweep.lidar;
         if let Some(place) = lidars.iter().position(|lidar| *lidar == number) {
@@ -95,13 +140,4 @@ fn take(reader: &mut SweepReader, gather: &mut Gather, lidars: &[usize]) {
         }
         reader.recycle(number, sweep.cloud);
     }
-}
-
-/// Cut azimuths by number of the lidar, as the reader wants them.
-fn cuts(lidars: &[usize], degrees: &[f64]) -> Vec<f64> {
-    let mut by_number = vec![0.0; lidars.iter().max().map_or(0, |last| last + 1)];
-    for (number, cut) in lidars.iter().zip(degrees) {
-        by_number[*number] = cut.to_radians();
-    }
-    by_number
 }
