@@ -3,10 +3,12 @@
 
 #[path = "support/families.rs"]
 mod families;
+#[path = "support/line.rs"]
+mod line;
 
 use std::net::SocketAddr;
 
-use families::{START, Writer, packet, writers};
+use families::{Writer, packet, writers};
 use lidar_deflect_core::capture::Datagram;
 use lidar_deflect_core::packet::ReturnMode;
 use lidar_deflect_core::packet::echoes::RawEcho;
@@ -18,28 +20,17 @@ use rand_chacha::ChaCha8Rng;
 
 /// Sends packets as `order` says; each arrives when it is complete.
 fn scan(writer: &Writer, mode: ReturnMode, order: &[u32]) -> ScanReport {
-    let source: SocketAddr = "192.168.1.201:10000".parse().unwrap();
-    let destination: SocketAddr = "192.168.1.100:2368".parse().unwrap();
     let period_ns = writer.model.period_ns(mode);
     let mut scan = Scan::new(ScanOptions::default());
     let echo = |_, _| RawEcho {
         range: 2_500,
         intensity: 9,
     };
-    let mut arrival = START;
-    for (record, number) in (0..).zip(order) {
+    let sent = order.iter().map(|number| {
         let sent = packet(writer, mode, *number, echo);
-        arrival = (sent.time + period_ns + 100_000).max(arrival + 1);
-        let payload = (writer.encode)(&sent);
-        scan.push(&Datagram {
-            time: arrival,
-            source,
-            destination,
-            payload: &payload,
-            record,
-            offset: 0,
-        });
-    }
+        (sent.time + period_ns, (writer.encode)(&sent))
+    });
+    line::deliver(2368, sent, |datagram| scan.push(datagram));
     scan.finish()
 }
 

@@ -1,9 +1,9 @@
 //! Does every Ouster and RoboSense model give back what was written into its packets, count what is
 //! missing, and survive any bytes?
 
-use std::net::SocketAddr;
+#[path = "support/line.rs"]
+mod line;
 
-use lidar_deflect_core::capture::Datagram;
 use lidar_deflect_core::packet::echoes::RawEcho;
 use lidar_deflect_core::packet::ouster::layout::{self as columns, Layout, RawColumn};
 use lidar_deflect_core::packet::ouster::profile::PROFILES;
@@ -480,8 +480,6 @@ fn changed_descriptions_of_units_are_survived() {
 
 /// Sends packets as `order` says; each arrives when it is complete.
 fn scan(writer: &Writer, order: &[u32]) -> ScanReport {
-    let source: SocketAddr = "192.168.1.201:10000".parse().unwrap();
-    let destination: SocketAddr = "192.168.1.100:6699".parse().unwrap();
     let units = writer.files.iter().map(|file| Given {
         source: None,
         file: file.clone(),
@@ -491,20 +489,12 @@ fn scan(writer: &Writer, order: &[u32]) -> ScanReport {
         units: units.collect(),
         ..ScanOptions::default()
     });
-    let mut arrival = Timestamp(START_NS);
-    for (record, number) in (0..).zip(order) {
+    let sent = order.iter().map(|number| {
         let payload = (writer.encode)(*number, writer.returns[0], &steady);
         let head = writer.model.head(&payload).unwrap();
-        arrival = (Timestamp(head.device_ns) + writer.period_ns + 100_000).max(arrival + 1);
-        scan.push(&Datagram {
-            time: arrival,
-            source,
-            destination,
-            payload: &payload,
-            record,
-            offset: 0,
-        });
-    }
+        (Timestamp(head.device_ns) + writer.period_ns, payload)
+    });
+    line::deliver(6699, sent, |datagram| scan.push(datagram));
     scan.finish()
 }
 

@@ -1,11 +1,12 @@
 //! Does every sensor without a rotor (Livox; RoboSense M series, E1, EMX, EM4) give back what was written
 //! into its packets, count what is missing, end its frames where they end, and survive any bytes?
 
+#[path = "support/line.rs"]
+mod line;
 #[path = "support/still.rs"]
 mod still;
 
 use std::collections::BTreeSet;
-use std::net::SocketAddr;
 
 use lidar_deflect_core::capture::Datagram;
 use lidar_deflect_core::cloud::ReturnKind;
@@ -316,23 +317,12 @@ fn options(writer: &Writer) -> ScanOptions {
 }
 
 /// Sends packets as `order` says; each arrives when it is complete. `datagrams` takes them.
-fn send(setting: &Setting, order: &[u32], mut datagrams: impl FnMut(&Datagram<'_>)) {
-    let source: SocketAddr = "192.168.1.201:10000".parse().unwrap();
-    let destination: SocketAddr = "192.168.1.100:57431".parse().unwrap();
-    let mut arrival = Timestamp(START_NS);
-    for (record, number) in (0..).zip(order) {
-        let payload = (setting.encode)(*number, &steady);
-        let sent = Timestamp(START_NS) + (i64::from(*number) + 1) * setting.period_ns;
-        arrival = (sent + 100_000).max(arrival + 1);
-        datagrams(&Datagram {
-            time: arrival,
-            source,
-            destination,
-            payload: &payload,
-            record,
-            offset: 0,
-        });
-    }
+fn send(setting: &Setting, order: &[u32], datagrams: impl FnMut(&Datagram<'_>)) {
+    let sent = order.iter().map(|number| {
+        let complete = Timestamp(START_NS) + (i64::from(*number) + 1) * setting.period_ns;
+        (complete, (setting.encode)(*number, &steady))
+    });
+    line::deliver(57431, sent, datagrams);
 }
 
 fn scan(writer: &Writer, setting: &Setting, order: &[u32]) -> ScanReport {

@@ -109,6 +109,12 @@ mod tests {
         }
     }
 
+    fn assert_one_offset(found: &[i64], times: &[i64]) {
+        let offset = found[0] - times[0];
+        let mut pairs = found.iter().zip(times);
+        assert!(pairs.all(|(key, time)| key - time == offset));
+    }
+
     #[test]
     fn losses_over_the_ends_of_frames_and_over_many_frames_are_exact() {
         let lost = [629..632, 1000..1001, 1259..1261, 2000..5000];
@@ -117,13 +123,7 @@ mod tests {
             .collect();
         let mut cycle = Cycle::new(Restarts::EveryFrame, 1, 630);
         let found = keys(&mut cycle, times.iter().map(|t| (*t, (t % 630) as u32 + 1)));
-        let offset = found[0] - times[0];
-        assert!(
-            found
-                .iter()
-                .zip(&times)
-                .all(|(key, time)| key - time == offset)
-        );
+        assert_one_offset(&found, &times);
     }
 
     #[test]
@@ -133,13 +133,7 @@ mod tests {
         ];
         let mut cycle = Cycle::new(Restarts::EveryFrame, 1, 630);
         let found = keys(&mut cycle, times.iter().map(|t| (*t, (t % 630) as u32 + 1)));
-        let offset = found[0] - times[0];
-        assert!(
-            found
-                .iter()
-                .zip(&times)
-                .all(|(key, time)| key - time == offset)
-        );
+        assert_one_offset(&found, &times);
     }
 
     #[test]

@@ -7,11 +7,11 @@
 //! Source: the maker's driver and the manual of the CH128X1. No real packet was at hand.
 
 use std::f64::consts::{PI, TAU};
-use std::sync::Mutex;
 
 use super::difop::{self, Difop};
 use super::mirror::{MIRRORS, Mirror};
 use super::pace;
+use super::paced::Units;
 use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::packet::aim::wrapped;
@@ -34,8 +34,7 @@ const BACK_DEG: f64 = 20.0;
 /// The packets of short models tell the second within the minute in every mode.
 const MINUTE_NS: i64 = 60 * NANOS_PER_SECOND;
 
-static KNOWN: Mutex<Vec<&'static Ch>> = Mutex::new(Vec::new());
-const MOST_KNOWN: usize = 200_000;
+static KNOWN: Units<Ch> = Units::new();
 
 /// A model of the series.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -102,18 +101,6 @@ impl Ch {
 
     fn duration_ns(&self, mode: ReturnMode) -> f64 {
         self.record_ns * packet::count(mode) as f64
-    }
-
-    fn known(self) -> Option<&'static Self> {
-        let mut known = KNOWN.lock().ok()?;
-        if let Some(same) = known.iter().find(|other| ***other == self) {
-            return Some(same);
-        }
-        (known.len() < MOST_KNOWN).then(|| {
-            let leaked: &'static Self = Box::leak(Box::new(self));
-            known.push(leaked);
-            leaked
-        })
     }
 
     /// Writes a data packet: the inverse of decoding.
@@ -207,7 +194,7 @@ impl Model for Ch {
         let record_ns = sent.record_ns * factor.unwrap_or(1.0);
         let sent = Self { record_ns, ..sent };
         (sent != *self)
-            .then(|| sent.known())?
+            .then(|| KNOWN.like(sent))?
             .map(|known| known as ModelRef)
     }
 

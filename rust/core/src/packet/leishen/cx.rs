@@ -6,10 +6,9 @@
 //!
 //! Source: the maker's driver; one real packet of a C16 of version 4.
 
-use std::sync::Mutex;
-
 use super::difop::{self, Difop};
 use super::pace;
+use super::paced::Units;
 use super::products::{PRODUCTS, Product};
 use crate::error::UnitError;
 use crate::packet::hesai::date;
@@ -64,9 +63,7 @@ impl Generation {
 }
 
 /// Units whose pace or clock is not the usual one, each once: models live as long as the program.
-static KNOWN: Mutex<Vec<&'static Cx>> = Mutex::new(Vec::new());
-/// More of them than there are paces and models.
-const MOST_KNOWN: usize = 200_000;
+static KNOWN: Units<Cx> = Units::new();
 
 /// A model of the series.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,18 +151,6 @@ impl Cx {
             Some((file, lasers)) => (lasers, Calibration::of(&[file], Calibration::Factory)),
             None => (nominal, Calibration::Nominal { obtain: OBTAIN }),
         }
-    }
-
-    fn known(self) -> Option<&'static Self> {
-        let mut known = KNOWN.lock().ok()?;
-        if let Some(same) = known.iter().find(|other| ***other == self) {
-            return Some(same);
-        }
-        (known.len() < MOST_KNOWN).then(|| {
-            let leaked: &'static Self = Box::leak(Box::new(self));
-            known.push(leaked);
-            leaked
-        })
     }
 
     /// Writes a data packet: the inverse of decoding.
@@ -257,7 +242,7 @@ impl Model for Cx {
         let shot_ns = sent.shot_ns * factor.unwrap_or(1.0);
         let sent = Self { shot_ns, ..sent };
         (sent != *self)
-            .then(|| sent.known())?
+            .then(|| KNOWN.like(sent))?
             .map(|known| known as ModelRef)
     }
 

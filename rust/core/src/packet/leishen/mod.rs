@@ -9,4 +9,5 @@ pub mod cx;
 pub mod difop;
 pub mod mirror;
 pub mod pace;
+mod paced;
 pub mod products;
