@@ -9,13 +9,12 @@ import numpy as np
 
 from lidar_deflect import judgement, network
 from lidar_deflect.calibration import Calibration, Pose
-from lidar_deflect.errors import CalibrationError, ConfigError
+from lidar_deflect.errors import CalibrationError
+from lidar_deflect.mounting import mounted, optical_centre_m
 from lidar_deflect.registration import Registered, Wall, register, surveyed_plane
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-
-    from numpy.typing import NDArray
 
     from lidar_deflect.config import Config, Lidar
     from lidar_deflect.measurement.unloaded import HoldCloud
@@ -71,18 +70,14 @@ def closed_form(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
 
 
 def _pose(config: Config, lidar: Lidar, cloud: HoldCloud, wall: Wall | None) -> Pose:
-    mounting = lidar.nominal_rotation()
-    if mounting is None or lidar.position_m is None:
-        raise ConfigError(
-            f"lidar {lidar.id} has no {'axes' if mounting is None else 'position_m'}",
-            code="config.no_pose",
-            hint="give position_m and axes of every lidar: the ground fixes only its tilt",
-        )
+    mounting = mounted(
+        lidar, hint="give position_m and axes of every lidar: the ground fixes only its tilt"
+    )
     try:
         found = register(
             cloud.xyz,
-            position_m=_optical_centre(lidar, np.array(mounting)),
-            mounting=np.array(mounting),
+            position_m=optical_centre_m(lidar, mounting),
+            mounting=mounting,
             mounting_u_deg=lidar.axes_u_deg,
             wall=wall,
             ground_range_m=lidar.ground_range_m or config.paper.ground_range_m,
@@ -92,11 +87,6 @@ def _pose(config: Config, lidar: Lidar, cloud: HoldCloud, wall: Wall | None) -> 
             f"lidar {lidar.id}: {error.message}", code=error.code, hint=error.hint
         ) from error
     return Pose(lidar.id, lidar.source or "", found.world_from_sensor, _evidence(lidar, found))
-
-
-def _optical_centre(lidar: Lidar, mounting: NDArray[np.float64]) -> NDArray[np.float64]:
-    surveyed = np.array(lidar.position_m, dtype=np.float64)
-    return np.asarray(surveyed + mounting @ np.array(lidar.lever_arm_m, dtype=np.float64))
 
 
 def _surveyed_wall(config: Config) -> Wall | None:

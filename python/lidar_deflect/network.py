@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect import _native
-from lidar_deflect.errors import CalibrationError, ConfigError
+from lidar_deflect.errors import CalibrationError
+from lidar_deflect.mounting import mounted, optical_centre_m
 from lidar_deflect.registration import rotation_onto, surveyed_plane
 
 if TYPE_CHECKING:
@@ -196,14 +197,9 @@ def first_pose(
     """Pose of one lidar in closed form, shape (4, 4): the given one, else ground and wall."""
     if lidar.world_from_sensor:
         return np.array(lidar.world_from_sensor, dtype=np.float64)
-    mounting = lidar.nominal_rotation()
-    if mounting is None or lidar.position_m is None:
-        raise ConfigError(
-            f"lidar {lidar.id} has no {'axes' if mounting is None else 'position_m'}",
-            code="config.no_pose",
-            hint="give position_m and axes of every lidar, or a world_from_sensor to start from",
-        )
-    rotation = np.array(mounting, dtype=np.float64)
+    rotation = mounted(
+        lidar, hint="give position_m and axes of every lidar, or a world_from_sensor to start from"
+    )
     ground = next(surface for surface in surfaces if surface.name == "ground")
     seen = hold.ground(rotation.T @ ground.normal)
     if seen is None:
@@ -214,7 +210,7 @@ def first_pose(
         )
     rotation = rotation_onto(rotation @ np.array(seen[0]), ground.normal) @ rotation
     pose = np.eye(4)
-    pose[:3, 3] = np.array(lidar.position_m) + rotation @ np.array(lidar.lever_arm_m)
+    pose[:3, 3] = optical_centre_m(lidar, rotation)
     pose[:3, :3] = _turned_to_walls(rotation, pose[:3, 3], lidar, hold, surfaces, abs(seen[1]))
     return pose
 

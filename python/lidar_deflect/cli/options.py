@@ -76,13 +76,18 @@ Sections = Annotated[
 
 def sensor_models(texts: Sequence[str] | None) -> dict[str, str]:
     """Read ``SOURCE=MODEL`` texts."""
-    models: dict[str, str] = {}
+    return pairs(texts, "--sensor", "SOURCE=MODEL")
+
+
+def pairs(texts: Sequence[str] | None, option: str, form: str) -> dict[str, str]:
+    """Read texts with a name before and a value behind the last equals sign."""
+    found: dict[str, str] = {}
     for text in texts or ():
-        source, equals, model = text.rpartition("=")
-        if not (equals and source and model):
-            raise typer.BadParameter(f"--sensor {text}: expected SOURCE=MODEL")
-        models[source] = model
-    return models
+        name, equals, value = text.rpartition("=")
+        if not (equals and name and value):
+            raise typer.BadParameter(f"{option} {text}: expected {form}")
+        found[name] = value
+    return found
 
 
 def beam_files(texts: Sequence[str] | None) -> dict[str, list[Path]]:

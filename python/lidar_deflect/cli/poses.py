@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from lidar_deflect.cli.options import Json, Overwrite, Quiet, Verbose, free
+from lidar_deflect.cli.options import Json, Overwrite, Quiet, Verbose, free, pairs
 from lidar_deflect.cli.talk import Talk, table
 
 SCHEMA = "lidar-deflect.poses/1"
@@ -64,7 +64,7 @@ def poses(
     Every pose takes points of the sensor's frame to the world: that of the vendor's driver.
     """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
-    names = _names(name)
+    names = pairs(name, "--name", "FRAME=NAME")
     if config is not None and out is None:
         raise typer.BadParameter("--config needs --out: where to write the configuration")
     if out is not None:
@@ -92,14 +92,3 @@ def poses(
     talk.result(document, table(["sensor", "x m", "y m", "z m"], rows))
     if out is not None:
         talk.note(f"written: {out}")
-
-
-def _names(texts: list[str] | None) -> dict[str, str]:
-    """Read ``FRAME=NAME`` texts."""
-    names = {}
-    for text in texts or ():
-        old, equals, new = text.rpartition("=")
-        if not (equals and old and new):
-            raise typer.BadParameter(f"--name {text}: expected FRAME=NAME")
-        names[old] = new
-    return names
