@@ -5,6 +5,7 @@
 pub mod closed_form;
 pub mod field;
 pub mod hold;
+pub mod judged;
 pub mod network;
 pub mod normal;
 pub mod rows;

@@ -12,6 +12,7 @@ use thiserror::Error;
 
 use super::field::Field;
 use super::hold::Hold;
+use super::judged::{GROSS, Judged, doubted, judged, largest, share};
 use super::normal::{Normal, Solved};
 use super::rows::{self, Row};
 use super::select::{self, Gate, Met};
@@ -34,12 +35,6 @@ pub struct Priors {
 
 /// Sigma of a surface's bend over half its extent, metres.
 const BEND_U_M: f64 = 0.02;
-/// Residuals beyond this many sigmas weigh less, beyond the second none at all.
-const DOUBTED: f64 = 2.5;
-const REFUSED: f64 = 6.0;
-/// Surveyed values beyond this many sigmas of their studentised residual are gross errors: one in
-/// sixteen thousand by chance.
-pub const GROSS: f64 = 4.0;
 /// Steps of one adjustment.
 const STEPS: usize = 12;
 /// An adjustment has settled when no pose moves by more than this part of its sigma.
@@ -142,21 +137,6 @@ impl Adjusted {
     pub fn points(&self) -> &[Vector3<f64>] {
         &self.points_m
     }
-}
-
-/// One row of what was known.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Judged {
-    /// Observed minus adjusted, in its unit.
-    pub residual: f64,
-    /// A-priori standard deviation.
-    pub sigma: f64,
-    /// Share of an error in it that its residual shows: 0 uncontrolled, 1 fully.
-    pub redundancy: f64,
-    /// Residual over its own standard deviation.
-    pub studentised: f64,
-    /// Left out as a gross error.
-    pub left_out: bool,
 }
 
 /// Why there is no adjustment.
@@ -511,40 +491,4 @@ impl<'a> Work<'a> {
             converged: self.converged,
         }
     }
-}
-
-fn judged(row: &Row, variance: f64, left_out: bool) -> Judged {
-    let own = row.sigma.powi(2);
-    // Left out, it is predicted by the rest; kept, it has pulled the rest towards itself.
-    let left = if left_out {
-        own + variance
-    } else {
-        (own - variance).max(1e-6 * own)
-    };
-    Judged {
-        residual: row.residual,
-        sigma: row.sigma,
-        redundancy: if left_out { 1.0 } else { left / own },
-        studentised: row.residual / left.sqrt(),
-        left_out,
-    }
-}
-
-fn largest(judged: &[Judged]) -> f64 {
-    judged
-        .iter()
-        .map(|j| j.studentised.abs())
-        .fold(0.0, f64::max)
-}
-
-/// Weight of a ray by its residual: Huber's, and none where something else was hit.
-fn share(row: &Row) -> f64 {
-    match row.residual.abs() / row.sigma {
-        t if t > REFUSED => 0.0,
-        _ => doubted(row),
-    }
-}
-
-fn doubted(row: &Row) -> f64 {
-    (DOUBTED * row.sigma / row.residual.abs()).min(1.0)
 }

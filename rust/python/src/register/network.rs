@@ -1,7 +1,8 @@
 //! The network adjustment: holds of several lidars and what is known in, poses and covariance out.
 
 use lidar_deflect_core::register::hold::{self, Beam, Echoes, Hold, HoldParams};
-use lidar_deflect_core::register::network::{self, Adjusted, Judged, Network, Priors};
+use lidar_deflect_core::register::judged::Judged;
+use lidar_deflect_core::register::network::{self, Adjusted, Network, Priors};
 use lidar_deflect_core::register::rows::Sight;
 use lidar_deflect_core::register::start;
 use lidar_deflect_core::register::state::{LidarState, State};

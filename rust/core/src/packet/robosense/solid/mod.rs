@@ -7,6 +7,7 @@
 
 pub mod blocks;
 pub mod columns;
+mod decoder;
 pub mod description;
 pub mod header;
 pub mod sensor;

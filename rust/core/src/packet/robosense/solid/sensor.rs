@@ -5,21 +5,17 @@
 
 use super::blocks::{Block, Blocks, Point};
 use super::columns::Columns;
+use super::decoder::SolidDecoder;
 use super::description::{self, Angles};
 use super::header;
-use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
-use crate::packet::aim::{Centidegrees, bear, wrapped};
-use crate::packet::echoes::{RawEcho, judge};
+use crate::packet::aim::Centidegrees;
+use crate::packet::echoes::RawEcho;
 use crate::packet::frames::place_rad;
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
-use crate::packet::{
-    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
-};
+use crate::packet::{Counting, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
-/// Metres of one unit of range.
-const UNIT_M: f64 = 0.005;
 /// Time of a frame at the rate that sensors are delivered with.
 const FRAME_NS: i64 = 100_000_000;
 /// Types that are known.
@@ -208,12 +204,12 @@ impl Solid {
         is_sound && header::is_packet(payload, self.len())
     }
 
-    fn mode(&self, payload: &[u8]) -> ReturnMode {
+    pub(super) fn mode(&self, payload: &[u8]) -> ReturnMode {
         header::return_mode(payload, self.dual)
     }
 
     /// Returns of a shot that stand side by side in a packet.
-    fn returns(&self, payload: &[u8]) -> usize {
+    pub(super) fn returns(&self, payload: &[u8]) -> usize {
         match self.body {
             Body::Blocks(blocks) if blocks.point != Point::Pair => 1,
             _ => self.mode(payload).returns(),
@@ -232,7 +228,7 @@ impl Solid {
         }
     }
 
-    fn cut(&self, (range, intensity): (u16, u8)) -> RawEcho {
+    pub(super) fn cut(&self, (range, intensity): (u16, u8)) -> RawEcho {
         let (least, most) = self.limits;
         RawEcho {
             range: if (least..=most).contains(&range) {
@@ -253,7 +249,12 @@ impl Solid {
     }
 
     /// Visits the echoes of shots whose returns do not stand side by side.
-    fn singles(&self, blocks: Blocks, payload: &[u8], mut take: impl FnMut(Shot<'_>, RawEcho)) {
+    pub(super) fn singles(
+        &self,
+        blocks: Blocks,
+        payload: &[u8],
+        mut take: impl FnMut(Shot<'_>, RawEcho),
+    ) {
         for (number, block) in blocks.blocks(payload).enumerate() {
             for (channel, point) in block.points().enumerate() {
                 let echo = self.cut(blocks.point.echoes(point)[0]);
@@ -271,7 +272,12 @@ impl Solid {
     }
 
     /// Visits the shots of two returns side by side.
-    fn pairs(&self, blocks: Blocks, payload: &[u8], mut take: impl FnMut(Shot<'_>, [RawEcho; 2])) {
+    pub(super) fn pairs(
+        &self,
+        blocks: Blocks,
+        payload: &[u8],
+        mut take: impl FnMut(Shot<'_>, [RawEcho; 2]),
+    ) {
         for (number, block) in blocks.blocks(payload).enumerate() {
             for (channel, point) in block.points().enumerate() {
                 let echoes = blocks.point.echoes(point).map(|echo| self.cut(echo));
@@ -288,22 +294,15 @@ impl Solid {
 }
 
 /// A shot of a block.
-struct Shot<'a> {
-    number: usize,
-    block: Block<'a>,
-    channel: usize,
-    point: &'a [u8],
-}
-
-/// Meaning of a single return.
-fn single_kind(mode: ReturnMode, index: u8) -> ReturnKind {
-    match (mode, index) {
-        (ReturnMode::Last, _) => ReturnKind::Last,
-        (ReturnMode::First, _) => ReturnKind::First,
-        // Of two returns in packets of their own the second is the last.
-        (ReturnMode::Dual, 1) => ReturnKind::Last,
-        _ => ReturnKind::Strongest,
-    }
+pub struct Shot<'a> {
+    /// Of the block in the packet.
+    pub number: usize,
+    /// Where it stands.
+    pub block: Block<'a>,
+    /// Within the block.
+    pub channel: usize,
+    /// Its bytes.
+    pub point: &'a [u8],
 }
 
 impl Model for Solid {
@@ -458,128 +457,5 @@ impl Model for Solid {
             }),
             calibration,
         })
-    }
-}
-
-struct SolidDecoder {
-    model: Solid,
-    table: Centidegrees,
-    /// Of the rows of columns.
-    angles: Option<Angles>,
-}
-
-/// Where and when a shot was fired.
-struct Ray {
-    direction: [f64; 3],
-    azimuth_rad: f32,
-    since_ns: i64,
-    ring: u16,
-    block: u16,
-}
-
-struct Work<'a> {
-    place: Place,
-    encoder_rad: f32,
-    out: &'a mut Decoded,
-}
-
-impl Work<'_> {
-    #[inline]
-    fn push(&mut self, ray: &Ray, echo: RawEcho, index: u8, kind: ReturnKind) {
-        let range_m = f64::from(echo.range) * UNIT_M;
-        self.out.cloud.push(&Return {
-            xyz_m: ray.direction.map(|part| (range_m * part) as f32),
-            time: self.place.time + ray.since_ns,
-            range_m: range_m as f32,
-            azimuth_rad: ray.azimuth_rad,
-            ring: ray.ring,
-            intensity: echo.intensity.into(),
-            return_index: index,
-            return_kind: kind,
-            packet: self.place.packet,
-            block: ray.block,
-        });
-        self.out.encoder_rad.push(self.encoder_rad);
-    }
-
-    fn push_pair(&mut self, ray: &Ray, echoes: [RawEcho; 2], mode: ReturnMode) {
-        let (kinds, merged) = judge(mode, &echoes);
-        self.out.merged += u64::from(merged);
-        for (index, (echo, kind)) in echoes.into_iter().zip(kinds).enumerate() {
-            if let Some(kind) = kind {
-                self.push(ray, echo, index as u8, kind);
-            }
-        }
-    }
-}
-
-impl SolidDecoder {
-    fn ray(&self, point: Point, shot: &Shot<'_>) -> Ray {
-        let aim = point.aim(shot.point, self.table);
-        Ray {
-            direction: aim.direction,
-            azimuth_rad: aim.azimuth_rad,
-            since_ns: shot.block.since_ns(),
-            ring: shot.channel as u16,
-            block: shot.number as u16,
-        }
-    }
-
-    fn columns(&self, columns: Columns, payload: &[u8], work: &mut Work<'_>) {
-        let Some(angles) = &self.angles else { return };
-        let mode = self.model.mode(payload);
-        let returns = mode.returns();
-        let lead_ns = columns.lead_ns(payload);
-        let aims = columns.aims(payload, angles);
-        for (place, slot) in columns.slots(payload, returns).enumerate().step_by(returns) {
-            let (direction, yaw_rad) = aims.row(slot.row, slot.row / columns.zone_rows(), angles);
-            let ray = Ray {
-                direction,
-                azimuth_rad: wrapped(yaw_rad),
-                since_ns: columns.since_ns(slot.row, lead_ns),
-                ring: slot.row as u16,
-                block: place as u16,
-            };
-            let echo = |place: usize| self.model.cut(columns.echo(payload, place));
-            if returns == 2 {
-                work.push_pair(&ray, [echo(place), echo(place + 1)], mode);
-            } else if echo(place).range != 0 {
-                work.push(&ray, echo(place), 0, single_kind(mode, 0));
-            }
-        }
-    }
-}
-
-impl Decoder for SolidDecoder {
-    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let Some(head) = self.model.head(payload) else {
-            return out.drops.add("packet_size", 1);
-        };
-        let mode = head.return_mode;
-        let first = out.cloud.len();
-        let mut work = Work {
-            place,
-            encoder_rad: wrapped(head.azimuth_rad),
-            out,
-        };
-        match self.model.body {
-            Body::Columns(columns) => self.columns(columns, payload, &mut work),
-            Body::Blocks(blocks) if self.model.returns(payload) == 1 => {
-                self.model.singles(blocks, payload, |shot, echo| {
-                    let index = shot.block.return_index();
-                    let kind = single_kind(mode, index);
-                    work.push(&self.ray(blocks.point, &shot), echo, index, kind);
-                });
-            }
-            Body::Blocks(blocks) => self.model.pairs(blocks, payload, |shot, echoes| {
-                work.push_pair(&self.ray(blocks.point, &shot), echoes, mode);
-            }),
-        }
-        if let Body::Blocks(blocks) = self.model.body
-            && blocks.point != Point::Angles
-        {
-            let cloud = &mut out.cloud;
-            bear(&cloud.xyz_m[first..], &mut cloud.azimuth_rad[first..]);
-        }
     }
 }
