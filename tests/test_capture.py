@@ -216,7 +216,8 @@ def test_ctrl_c_is_felt_within_a_block(tmp_path: Path) -> None:
     path = write_pcap(tmp_path / "long.pcap", puck(30.0))
     again = [str(path)]
     script = (
-        "import sys; from lidar_deflect import capture\n"
+        "import signal, sys; from lidar_deflect import capture\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "print('ready', flush=True)\n"
         "while True:\n"
         "    capture.open(sys.argv[1:]).scan()\n"

@@ -7,6 +7,8 @@ import signal
 import subprocess
 import sys
 import time
+import weakref
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +16,7 @@ import pytest
 from lidar_deflect import config
 from lidar_deflect.cli import failure, options, talk, units
 from lidar_deflect.cli.app import COMMANDS, app, run
+from lidar_deflect.cli.interrupt import Interrupt
 from lidar_deflect.errors import CaptureError, LidarDeflectError, OutputError
 from lidar_deflect.files import uninterrupted
 
@@ -235,7 +238,38 @@ def test_only_named_lidars_and_sections_stay_with_what_belongs_to_them() -> None
         units.narrowed(whole, None, ["S85"])
 
 
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Hear Ctrl-C, which a shell's background jobs are started without."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals differ on Windows")
+@pytest.mark.usefixtures("heard")
+def test_an_interrupt_that_python_only_printed_strikes_again(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    class Referent:
+        pass
+
+    def swallowed(_: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    interrupt, referent = Interrupt(), Referent()
+    with interrupt.armed():
+        alive = weakref.ref(referent, swallowed)
+        del referent
+        with pytest.raises(KeyboardInterrupt):
+            time.sleep(5.0)
+    assert alive() is None
+    assert interrupt.came
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals differ on Windows")
+@pytest.mark.usefixtures("heard")
 def test_an_interrupt_waits_for_a_file_to_be_whole() -> None:
     done = []
 

@@ -79,11 +79,8 @@ def _root(
 
 def run(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code; nothing but its result is on stdout."""
-    INTERRUPT.arm()
-    try:
+    with INTERRUPT.armed():
         return _run(arguments)
-    finally:
-        INTERRUPT.restore()
 
 
 def _run(arguments: Sequence[str]) -> int:

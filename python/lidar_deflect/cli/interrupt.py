@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import sys
-from typing import Any
+import threading
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+AGAIN_S = 0.01
+"""After this the interrupt that Python only printed strikes again, where it is heard."""
 
 
 class Interrupt:
@@ -17,6 +26,18 @@ class Interrupt:
     def __init__(self) -> None:
         self.came = False
         self._before: Any = None
+
+    @contextmanager
+    def armed(self) -> Iterator[None]:
+        """Take Ctrl-C within, unless it is taken already."""
+        taken = self._before is not None
+        if not taken:
+            self.arm()
+        try:
+            yield
+        finally:
+            if not taken:
+                self.restore()
 
     def arm(self) -> None:
         """Take Ctrl-C from here on."""
@@ -42,6 +63,7 @@ class Interrupt:
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
             sys.unraisablehook = sys.__unraisablehook__
+            self._before = None
 
     def _raise(self, *_: object) -> None:
         self.came = True
@@ -49,9 +71,13 @@ class Interrupt:
 
     def _unraisable(self, unraisable: Any) -> None:
         if unraisable.exc_type is not None and issubclass(unraisable.exc_type, KeyboardInterrupt):
-            signal.raise_signal(signal.SIGINT)
+            threading.Timer(AGAIN_S, self._strike_again).start()
         else:
             sys.__unraisablehook__(unraisable)
+
+    def _strike_again(self) -> None:
+        if self._before is not None:
+            _thread.interrupt_main()
 
 
 INTERRUPT = Interrupt()
