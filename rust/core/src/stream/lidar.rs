@@ -185,7 +185,8 @@ impl Lidar {
 
     fn count(&mut self, ordered: &Ordered, tally: Tally, time: Timestamp, shared: &Shared) {
         let head = ordered.ticket.head;
-        let offset_ns = (ordered.ticket.arrival - ordered.ticket.device) - head.duration_ns;
+        let behind_ns = ordered.ticket.arrival - ordered.ticket.device;
+        let offset_ns = behind_ns.saturating_sub(head.duration_ns);
         let (turned_rad, turned_ns) = self.turned(ordered);
         let second = self.second(time, shared);
         second.points += u64::from(tally.points);
@@ -367,10 +368,7 @@ impl Lidar {
                 "too few packets to tell {model} from {others}: name the model with --sensor"
             ));
         }
-        let jumps = info.clock.segments().len().saturating_sub(1);
-        if jumps > 0 {
-            notes.push(format!("the device clock jumped {jumps} times"));
-        }
+        notes.extend(info.clock.jumps_in_words(info.first));
         if self.mode_changes > 0 {
             let changes = self.mode_changes;
             notes.push(format!("the return mode changed {changes} times"));
