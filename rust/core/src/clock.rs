@@ -18,6 +18,8 @@ const UTC_SHARE: f64 = 0.95;
 pub const SINCE_PULSE: i64 = -(1 << 61);
 /// Jumps beyond so many join the segment before: such a clock is broken anyway.
 const MAX_SEGMENTS: usize = 1000;
+/// So many jumps are told one by one.
+const MAX_TOLD: usize = 3;
 
 /// Unrolls a device clock that starts again, with the host's time as guide.
 #[derive(Debug, Clone)]
@@ -98,17 +100,31 @@ pub struct ClockSegment {
     pub drift: f64,
     /// Packets it rests on.
     pub packets: u64,
+    /// Device time of its first packet.
+    pub from: Timestamp,
+}
+
+/// A jump of the device clock against the host's.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClockJump {
+    /// UTC of the first packet behind it.
+    pub at: Timestamp,
+    /// How far the device clock went ahead; negative where it was set back.
+    pub by_ns: i64,
 }
 
 impl ClockSegment {
+    /// Host minus device at a device time of this stretch.
+    fn offset_at(&self, device: Timestamp) -> i64 {
+        let drifted_ns = (device - self.reference) as f64 * self.drift;
+        self.offset_ns.saturating_add(drifted_ns.round() as i64)
+    }
+
     /// UTC of a device time.
     pub fn utc(&self, device: Timestamp) -> Timestamp {
         match self.kind {
             ClockKind::Locked | ClockKind::Utc => device,
-            ClockKind::FreeRunning => {
-                let drifted_ns = (device - self.reference) as f64 * self.drift;
-                device + self.offset_ns + drifted_ns.round() as i64
-            }
+            ClockKind::FreeRunning => device + self.offset_at(device),
         }
     }
 }
@@ -131,6 +147,34 @@ impl ClockModel {
         self.segments
             .get(segment.min(last))
             .map_or(device, |line| line.utc(device))
+    }
+
+    /// Where the clock jumped, in the order of arrival.
+    pub fn jumps(&self) -> impl Iterator<Item = ClockJump> + '_ {
+        self.segments.windows(2).map(|pair| {
+            let (before, after) = (&pair[0], &pair[1]);
+            let offset_ns = after.offset_at(after.from);
+            // The time before the jump goes on to its place on the host's clock.
+            let known_as = after.from + offset_ns + before.offset_ns.saturating_neg();
+            ClockJump {
+                at: after.utc(after.from),
+                by_ns: before.offset_at(known_as).saturating_sub(offset_ns),
+            }
+        })
+    }
+
+    /// What to tell of the jumps, counting from the stream's first packet; `None` where there are none.
+    pub fn jumps_in_words(&self, first: Timestamp) -> Option<String> {
+        let count = self.segments.len().saturating_sub(1);
+        let told = self.jumps().take(MAX_TOLD).map(|jump| {
+            let by_s = jump.by_ns as f64 / NANOS_PER_SECOND as f64;
+            let after_s = jump.at.seconds_since(first);
+            format!("by {by_s:+.3} s, {after_s:.1} s after its first packet")
+        });
+        let told = told.collect::<Vec<_>>().join("; ");
+        let more = if count > MAX_TOLD { "; ..." } else { "" };
+        let times = if count == 1 { "time" } else { "times" };
+        (count > 0).then(|| format!("the device clock jumped {count} {times}: {told}{more}"))
     }
 
     /// The segment that most packets rest on.
@@ -183,6 +227,7 @@ impl ClockEstimator {
                 offset_ns: line.offset_ns,
                 drift: line.slope,
                 packets: envelope.packets(),
+                from: envelope.from(),
             }
         };
         ClockModel {

@@ -609,6 +609,18 @@ fn metadata_of_another_sensor_are_taken_with_a_warning_and_two_of_them_not_at_al
 }
 
 #[test]
+fn two_files_that_differ_in_ports_alone_describe_one_sensor() {
+    let mut writer = ouster(&PROFILES[1], (0, 1023));
+    let text = String::from_utf8(writer.files[0].content.clone()).unwrap();
+    let other = text.replacen('{', "{\"udp_port_imu\": 7504, ", 1);
+    writer.files.push(UnitFile::new("other.json", other));
+    let report = scan(&writer, &(0..200).collect::<Vec<_>>());
+    assert_eq!(report.lidars[0].model.id(), "os1-32");
+    assert!(report.lidars[0].calibration.is_ok());
+    report.check_units().unwrap();
+}
+
+#[test]
 fn an_older_helios_is_told_by_what_its_halves_see() {
     for is_half in [true, false] {
         let echo = move |place: usize, channel: usize, _: usize| {

@@ -62,7 +62,13 @@ impl FragmentPool {
             }
             self.begin(key, time);
         }
-        let added = self.add(&key, protocol, part, body);
+        let mut added = self.add(&key, protocol, part, body);
+        if added == Added::Duplicate && !self.holds(&key, part, body) {
+            // Other bytes at the same place: the identification came again, before its time.
+            self.abandon(&key);
+            self.begin(key, time);
+            added = self.add(&key, protocol, part, body);
+        }
         match added {
             Added::Complete => self.finish(key),
             Added::Duplicate => self.facts.duplicates += 1,
@@ -133,6 +139,11 @@ impl FragmentPool {
         })
     }
 
+    fn holds(&self, key: &Key, part: Fragment, body: &[u8]) -> bool {
+        let assembly = self.waiting.get(key);
+        assembly.is_some_and(|assembly| assembly.holds(part.offset, body))
+    }
+
     fn expire(&mut self, now: Timestamp) {
         while self
             .by_age
@@ -162,15 +173,22 @@ impl FragmentPool {
             .waiting
             .get(&key)
             .is_some_and(|assembly| assembly.serial == serial)
-            && let Some(assembly) = self.waiting.remove(&key)
         {
-            self.waiting_bytes -= assembly.bytes().len() + OVERHEAD;
-            self.facts.incomplete += 1;
-            if self.spare.len() < REMEMBERED {
-                self.spare.push(assembly);
-            }
+            self.abandon(&key);
         }
         true
+    }
+
+    /// Gives up a datagram that waits.
+    fn abandon(&mut self, key: &Key) {
+        let Some(assembly) = self.waiting.remove(key) else {
+            return;
+        };
+        self.waiting_bytes -= assembly.bytes().len() + OVERHEAD;
+        self.facts.incomplete += 1;
+        if self.spare.len() < REMEMBERED {
+            self.spare.push(assembly);
+        }
     }
 }
 
@@ -247,6 +265,25 @@ mod tests {
             assert_eq!(push(&mut pool, 0, 8, false, 2 * n + 1, 0), Added::Complete);
         }
         assert_eq!(pool.facts().datagrams, 100);
+    }
+
+    #[test]
+    fn an_identification_that_comes_again_mixes_nothing() {
+        let mut pool = FragmentPool::default();
+        push(&mut pool, 0, 0, true, 1, 0);
+        push(&mut pool, 0, 8, true, 2, 0);
+        // The last fragment is lost; the next datagram has the same identification.
+        assert_eq!(push(&mut pool, 0, 0, true, 5, 1), Added::Waiting);
+        assert_eq!(push(&mut pool, 0, 8, true, 6, 1), Added::Waiting);
+        assert_eq!(push(&mut pool, 0, 16, false, 7, 1), Added::Complete);
+        assert_eq!(pool.completed().0, [[5; 8], [6; 8], [7; 8]].concat());
+        pool.give_up();
+        let facts = pool.facts();
+        assert_eq!(
+            (facts.datagrams, facts.duplicates, facts.incomplete),
+            (1, 0, 1)
+        );
+        assert_eq!(pool.waiting_bytes, 0);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use std::net::{IpAddr, Ipv4Addr, Ipv6Addr};
 use std::ops::Range;
 
 use super::link::Version;
+use super::udp::{self, UDP};
 
 const IPV4_MIN_LEN: usize = 20;
 const IPV6_LEN: usize = 40;
@@ -47,6 +48,9 @@ pub(crate) struct IpPacket {
 
 /// Reads the IP headers of `data`.
 ///
+/// A whole datagram of UDP that says itself where it ends is taken by its own word: the first VLP-16 wrote the
+/// length of its data packets into the IPv4 headers of its position packets as well.
+///
 /// # Errors
 /// The reason to drop the record: `damaged_headers` or `truncated_record`.
 #[inline]
@@ -65,12 +69,18 @@ fn parse_v4(data: &[u8]) -> Result<IpPacket, &'static str> {
     if header[0] >> 4 != 4 || header_len < IPV4_MIN_LEN {
         return Err("damaged_headers");
     }
-    let stop = end_of_body(u16_at(header, 2), 0, data.len())?;
+    let flags = u16_at(header, 6);
+    let (offset, more) = (usize::from(flags & 0x1FFF) * 8, flags & 0x2000 != 0);
+    let is_whole = header[9] == UDP && offset == 0 && !more;
+    let stop = match end_of_body(u16_at(header, 2), 0, data.len()) {
+        Err(_) if is_whole && udp::parse(data.get(header_len..).unwrap_or_default()).is_ok() => {
+            data.len()
+        }
+        stop => stop?,
+    };
     if stop < header_len {
         return Err("damaged_headers");
     }
-    let flags = u16_at(header, 6);
-    let (offset, more) = (usize::from(flags & 0x1FFF) * 8, flags & 0x2000 != 0);
     let part = Fragment {
         identification: u32::from(u16_at(header, 4)),
         offset,
@@ -196,7 +206,6 @@ fn v6_at(header: &[u8; IPV6_LEN], at: usize) -> IpAddr {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::capture::udp::UDP;
 
     /// 10.0.0.1 -> 10.0.0.2, UDP, 8 bytes of body and 2 of padding behind them.
     fn v4() -> Vec<u8> {
@@ -231,6 +240,23 @@ mod tests {
         assert_eq!(parse(Version::V4, &bytes).unwrap().body, 24..28);
         bytes[3] = 0;
         assert_eq!(parse(Version::V4, &bytes).unwrap().body, 24..30);
+    }
+
+    /// As the position packets of a VLP-16 of 2014: 1234 bytes by their IPv4 header, fewer by UDP's and on the wire.
+    #[test]
+    fn udp_tells_the_end_where_ipv4_says_too_much() {
+        let mut bytes = v4();
+        bytes[2..4].copy_from_slice(&1234_u16.to_be_bytes());
+        bytes[24..26].copy_from_slice(&10_u16.to_be_bytes());
+        assert_eq!(parse(Version::V4, &bytes).unwrap().body, 20..30);
+        let mut cut = bytes.clone();
+        cut[25] = 11;
+        assert_eq!(parse(Version::V4, &cut), Err("truncated_record"));
+        let mut part = bytes.clone();
+        part[6] = 0x20; // more fragments follow
+        assert_eq!(parse(Version::V4, &part), Err("truncated_record"));
+        bytes[9] = 6;
+        assert_eq!(parse(Version::V4, &bytes), Err("truncated_record"));
     }
 
     #[test]

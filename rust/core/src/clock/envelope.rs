@@ -85,6 +85,11 @@ impl Envelope {
         self.packets
     }
 
+    /// Device time of the first of them.
+    pub fn from(&self) -> Timestamp {
+        self.bins.first().map_or(Timestamp(0), |bin| bin.device)
+    }
+
     /// Smallest offset of the newest two bins.
     pub fn recent_ns(&self) -> Option<i64> {
         let newest = &self.bins[self.bins.len().saturating_sub(2)..];

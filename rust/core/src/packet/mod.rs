@@ -16,6 +16,7 @@ pub mod ouster;
 pub mod points;
 pub mod proof;
 pub mod robosense;
+pub mod split;
 pub mod unit;
 pub mod velodyne;
 pub mod writer;
@@ -28,6 +29,7 @@ use crate::frame::Sensor;
 use crate::loss::cycle::Restarts;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 pub use models::{MODELS, claimants, closest, companion, model, unit_models};
+use split::{Following, Split};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
 /// A registered sensor model.
@@ -88,6 +90,16 @@ pub trait Model: Sync + std::fmt::Debug {
 
     /// Numbers of points and of merged returns in a data packet, without placing them.
     fn tally(&self, payload: &[u8]) -> Tally;
+
+    /// Whether firings may have their returns in two packets.
+    fn is_splitting(&self) -> bool {
+        false
+    }
+
+    /// What of a data packet belongs to firings that the packets around it share.
+    fn split(&self, _payload: &[u8]) -> Split {
+        Split::default()
+    }
 
     /// Time from the first shot of one packet to that of the next, as the maker states it.
     fn period_ns(&self, mode: ReturnMode) -> i64;
@@ -398,4 +410,16 @@ const BACKLASH_RAD: f64 = 0.02;
 pub trait Decoder: Send + Sync {
     /// Appends the returns of `payload` to `out`; a payload of another size gives none and is counted.
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded);
+
+    /// The same with the packet that follows, of which returns are taken whose firing began in `payload`: for
+    /// models with [`Model::is_splitting`].
+    fn decode_before(
+        &mut self,
+        payload: &[u8],
+        _following: Option<Following<'_>>,
+        place: Place,
+        out: &mut Decoded,
+    ) {
+        self.decode(payload, place, out);
+    }
 }

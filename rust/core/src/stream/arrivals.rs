@@ -35,6 +35,13 @@ pub struct Ordered {
     pub segment: usize,
 }
 
+impl Ordered {
+    /// Whether nothing is missing before it.
+    pub fn follows(&self) -> bool {
+        self.gap.is_none() && !self.is_jump
+    }
+}
+
 /// Packets missing before one.
 #[derive(Debug, Clone, Copy)]
 pub struct Gap {

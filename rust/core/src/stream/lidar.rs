@@ -11,6 +11,7 @@ use crate::clock::ClockEstimator;
 use crate::drops::Drops;
 use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
+use crate::packet::split::Split;
 use crate::packet::unit::{Calibration, Gather, UnitFile};
 use crate::packet::{ModelRef, PacketKind, Tally};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
@@ -32,6 +33,13 @@ pub struct Shared {
     pub pauses: Vec<Pause>,
 }
 
+/// What is kept of a packet until its turn has come.
+#[derive(Debug, Clone, Default)]
+struct Seen {
+    tally: Tally,
+    split: Split,
+}
+
 /// One lidar's stream on its way through the scan.
 #[derive(Debug)]
 pub struct Lidar {
@@ -43,7 +51,9 @@ pub struct Lidar {
     is_early: bool,
     remarks: Vec<String>,
     gather: Option<Box<dyn Gather>>,
-    arrivals: Arrivals<Tally>,
+    arrivals: Arrivals<Seen>,
+    /// Firings that the last packet shares with the next.
+    split: Split,
     clock: ClockEstimator,
     view: FieldOfView,
     pending: Vec<Gap>,
@@ -73,6 +83,7 @@ impl Lidar {
             remarks: Vec::new(),
             gather: model.gather(),
             arrivals: Arrivals::new(model),
+            split: Split::default(),
             clock: ClockEstimator::default(),
             view: FieldOfView::default(),
             pending: Vec::new(),
@@ -124,10 +135,14 @@ impl Lidar {
         if self.first.is_none() {
             self.remarks = self.model.remarks(payload);
         }
-        let tally = self.model.tally(payload);
-        let (ticket, what) = self.arrivals.offer(arrival, &head, mark(payload), || tally);
+        let seen = Seen {
+            tally: self.model.tally(payload),
+            split: self.model.split(payload),
+        };
+        let keep = || seen.clone();
+        let (ticket, what) = self.arrivals.offer(arrival, &head, mark(payload), keep);
         match what {
-            Arrival::Next(ordered) => self.take(&ordered, tally, shared),
+            Arrival::Next(ordered) => self.take(&ordered, seen, shared),
             Arrival::Held => {}
             Arrival::Duplicate => self.at(&ticket, shared, |counts| counts.duplicated += 1),
             Arrival::TooLate { was_lost } => self.at(&ticket, shared, |counts| {
@@ -141,8 +156,8 @@ impl Lidar {
     }
 
     fn drain(&mut self, shared: &mut Shared) {
-        while let Some((ordered, tally)) = self.arrivals.pop() {
-            self.take(&ordered, tally, shared);
+        while let Some((ordered, seen)) = self.arrivals.pop() {
+            self.take(&ordered, seen, shared);
         }
     }
 
@@ -153,7 +168,12 @@ impl Lidar {
         change(&mut self.second(time, shared).counts);
     }
 
-    fn take(&mut self, ordered: &Ordered, tally: Tally, shared: &mut Shared) {
+    fn take(&mut self, ordered: &Ordered, seen: Seen, shared: &mut Shared) {
+        let mut tally = seen.tally;
+        if ordered.follows() {
+            self.split.correct(&seen.split, &mut tally);
+        }
+        self.split = seen.split;
         let Ticket {
             arrival,
             device,
@@ -185,7 +205,8 @@ impl Lidar {
 
     fn count(&mut self, ordered: &Ordered, tally: Tally, time: Timestamp, shared: &Shared) {
         let head = ordered.ticket.head;
-        let offset_ns = (ordered.ticket.arrival - ordered.ticket.device) - head.duration_ns;
+        let behind_ns = ordered.ticket.arrival - ordered.ticket.device;
+        let offset_ns = behind_ns.saturating_sub(head.duration_ns);
         let (turned_rad, turned_ns) = self.turned(ordered);
         let second = self.second(time, shared);
         second.points += u64::from(tally.points);
@@ -367,10 +388,7 @@ impl Lidar {
                 "too few packets to tell {model} from {others}: name the model with --sensor"
             ));
         }
-        let jumps = info.clock.segments().len().saturating_sub(1);
-        if jumps > 0 {
-            notes.push(format!("the device clock jumped {jumps} times"));
-        }
+        notes.extend(info.clock.jumps_in_words(info.first));
         if self.mode_changes > 0 {
             let changes = self.mode_changes;
             notes.push(format!("the return mode changed {changes} times"));

@@ -12,6 +12,7 @@ use crate::drops::Drops;
 use crate::error::{InvalidValue, ReadError, UnitError};
 use crate::frame::Sensor;
 use crate::loss::view::FieldOfView;
+use crate::packet::split::Following;
 use crate::packet::{Decoded, Decoder, ModelRef, PacketKind, Place};
 use crate::sweep::{Placed, Sweep, SweepCutter};
 use crate::time::Timestamp;
@@ -91,6 +92,8 @@ struct Lane<S> {
     view: FieldOfView,
     sink: S,
     spare: Vec<Vec<u8>>,
+    /// A packet whose last firing may go on in the next one.
+    held: Option<(Ordered, Vec<u8>)>,
     is_done: bool,
 }
 
@@ -195,6 +198,7 @@ impl<S: Sink> Lane<S> {
             view: info.view.clone(),
             sink: S::new(number, cut_rad, visible_rad),
             spare: Vec::new(),
+            held: None,
             is_done: false,
         })
     }
@@ -236,6 +240,27 @@ impl<S: Sink> Lane<S> {
     }
 
     fn take(&mut self, ordered: &Ordered, payload: &[u8], step: &mut Step<'_, S::Out>) {
+        if !self.model.is_splitting() {
+            return self.read(ordered, payload, None, step);
+        }
+        let mut copy = self.spare.pop().unwrap_or_default();
+        copy.clear();
+        copy.extend_from_slice(payload);
+        if let Some((before, earlier)) = self.held.replace((*ordered, copy)) {
+            let packet = ordered.ticket.packet;
+            let following = ordered.follows().then_some(Following { payload, packet });
+            self.read(&before, &earlier, following, step);
+            self.spare.push(earlier);
+        }
+    }
+
+    fn read(
+        &mut self,
+        ordered: &Ordered,
+        payload: &[u8],
+        following: Option<Following<'_>>,
+        step: &mut Step<'_, S::Out>,
+    ) {
         let ticket = &ordered.ticket;
         let time = self.clock.utc(ordered.segment, ticket.device);
         if self.is_done || step.limits.stop.is_some_and(|stop| time >= stop) {
@@ -260,13 +285,17 @@ impl<S: Sink> Lane<S> {
             packet: ticket.packet,
             mean_rate_rad_per_ns: ticket.mean_rate_rad_per_ns,
         };
-        self.decoder.decode(payload, place, step.decoded);
+        self.decoder
+            .decode_before(payload, following, place, step.decoded);
         self.sink.push(&placed, step.decoded, step.out);
     }
 
     fn finish(&mut self, step: &mut Step<'_, S::Out>) {
         self.arrivals.flush();
         self.drain(step);
+        if let Some((last, payload)) = self.held.take() {
+            self.read(&last, &payload, None, step);
+        }
         self.sink.finish(step.out);
     }
 }

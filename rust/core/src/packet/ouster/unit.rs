@@ -37,7 +37,14 @@ const MOST_KNOWN: usize = 10_000;
 /// Models of the sensors that `files` describe: those that take their own packets alone, then those that
 /// take all packets of the size.
 pub fn models(files: &[UnitFile]) -> Vec<ModelRef> {
-    let units: Vec<[&'static Unit; 2]> = files.iter().filter_map(known).collect();
+    let mut units: Vec<[&'static Unit; 2]> = Vec::new();
+    for unit in files.iter().filter_map(known) {
+        // Files that differ in ports or the like only describe one sensor.
+        let is_same = |other: &[&'static Unit; 2]| other[0].metadata == unit[0].metadata;
+        if !units.iter().any(is_same) {
+            units.push(unit);
+        }
+    }
     let strict = units.iter().map(|unit| unit[0] as ModelRef);
     strict
         .chain(units.iter().map(|unit| unit[1] as ModelRef))
@@ -193,7 +200,8 @@ impl Model for Unit {
     }
 
     fn takes(&self, file: &UnitFile) -> bool {
-        *file == self.file
+        let is_same = |other: &Metadata| *other == self.metadata;
+        *file == self.file || matches!(metadata::read(file), Some(Ok(other)) if is_same(&other))
     }
 
     fn describe(&self, _files: &[UnitFile]) -> UnitFacts {

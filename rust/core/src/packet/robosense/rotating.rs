@@ -14,6 +14,7 @@ use crate::cloud::Return;
 use crate::error::UnitError;
 use crate::packet::aim::wrapped;
 use crate::packet::echoes::{RawEcho, judge};
+use crate::packet::split::{Following, Half, Split};
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
 use crate::packet::{
     Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
@@ -143,6 +144,17 @@ struct Shot {
     slot: Slot,
     echoes: [RawEcho; 2],
     blocks: [usize; 2],
+    /// The second return lies in the packet that follows.
+    is_shared: bool,
+}
+
+/// Which firings of a packet to visit.
+#[derive(Debug, Clone, Copy, Default)]
+struct Ends<'a> {
+    /// The first one was taken with the packet before.
+    is_lead_taken: bool,
+    /// The packet that has the second return of the last one.
+    next: Option<View<'a>>,
 }
 
 impl<F: Family> Rotating<F> {
@@ -163,26 +175,32 @@ impl<F: Family> Rotating<F> {
     }
 }
 
-/// Visits all shots with an echo in the order of firings and slots.
-fn visit<F: Family>(family: &F, view: &View<'_>, turn: &Turn, mut take: impl FnMut(&Shot)) {
-    let returns = family.returns(view);
-    let unit_m = family.unit_m(view);
+/// Echoes beyond the limits of a model are none.
+fn cut<F: Family>(family: &F, view: &View<'_>, mut echo: RawEcho) -> RawEcho {
     let (least_m, most_m) = family.limits_m();
-    let cut = |mut echo: RawEcho| {
-        let range_m = f64::from(echo.range) * unit_m;
-        let is_within = range_m > least_m + GUARD_M && range_m <= most_m + GUARD_M;
-        if !is_within {
-            echo.range = 0;
-        }
-        echo
-    };
-    let channels = view.layout().channels;
+    let range_m = f64::from(echo.range) * family.unit_m(view);
+    let is_within = range_m > least_m + GUARD_M && range_m <= most_m + GUARD_M;
+    if !is_within {
+        echo.range = 0;
+    }
+    echo
+}
+
+/// Visits all shots with an echo in the order of firings and slots.
+fn visit<F: Family>(
+    family: &F,
+    view: &View<'_>,
+    turn: &Turn,
+    ends: Ends<'_>,
+    mut take: impl FnMut(&Shot),
+) {
+    let returns = family.returns(view);
     let mut shots: Vec<Shot> = Vec::new();
-    for firing in 0..turn.firings() {
+    for firing in usize::from(ends.is_lead_taken)..turn.firings() {
         shots.clear();
         shots.resize(2 * family.lasers(), Shot::default());
-        for (block, place) in turn.blocks_of(firing) {
-            for channel in 0..channels {
+        let mut fill = |view: &View<'_>, block: usize, place: usize, is_shared: bool| {
+            for channel in 0..view.layout().channels {
                 let slot = family.slot(returns, place, channel);
                 let number = slot.shot * family.lasers() + slot.laser;
                 let (Some(shot), true) = (shots.get_mut(number), slot.echo < 2) else {
@@ -190,9 +208,17 @@ fn visit<F: Family>(family: &F, view: &View<'_>, turn: &Turn, mut take: impl FnM
                 };
                 shot.firing = firing;
                 shot.slot = slot;
-                shot.echoes[slot.echo] = cut(view.echo(block, channel));
+                shot.echoes[slot.echo] = cut(family, view, view.echo(block, channel));
                 shot.blocks[slot.echo] = block;
+                shot.is_shared |= is_shared;
             }
+        };
+        let blocks = turn.blocks_of(firing);
+        let held = blocks.map(|(block, place)| fill(view, block, place, false));
+        let held = held.count();
+        let is_last = firing + 1 == turn.firings();
+        if let Some(next) = ends.next.as_ref().filter(|_| is_last && turn.has_tail()) {
+            fill(next, 0, held, true);
         }
         let is_echo = |shot: &&Shot| shot.echoes.iter().any(|echo| echo.range != 0);
         shots.iter().filter(is_echo).for_each(&mut take);
@@ -268,11 +294,32 @@ impl<F: Family> Model for Rotating<F> {
             return tally;
         };
         let turn = Turn::of(&self.0, &view, 0.0);
-        visit(&self.0, &view, &turn, |shot| {
+        visit(&self.0, &view, &turn, Ends::default(), |shot| {
             let [one, other] = shot.echoes;
             tally.add_pair(one.range, other.range);
         });
         tally
+    }
+
+    fn is_splitting(&self) -> bool {
+        self.0.layout().blocks % self.0.blocks_of_firing(2).max(1) != 0
+    }
+
+    fn split(&self, payload: &[u8]) -> Split {
+        let Some(view) = self.view(payload).filter(|_| self.is_splitting()) else {
+            return Split::default();
+        };
+        let turn = Turn::of(&self.0, &view, 0.0);
+        let half = |block: usize| Half {
+            azimuth: view.azimuth(block),
+            ranges: (0..view.layout().channels)
+                .map(|channel| cut(&self.0, &view, view.echo(block, channel)).range)
+                .collect(),
+        };
+        Split {
+            lead: turn.has_lead().then(|| half(0)),
+            tail: turn.has_tail().then(|| half(view.blocks() - 1)),
+        }
     }
 
     fn period_ns(&self, mode: ReturnMode) -> i64 {
@@ -378,6 +425,8 @@ struct RotatingDecoder<F> {
     family: F,
     lasers: Vec<Laser>,
     settings: Settings,
+    /// Number of the packet whose first block was taken with the packet before.
+    taken: Option<u32>,
 }
 
 impl<F: Family> RotatingDecoder<F> {
@@ -401,7 +450,23 @@ impl<F: Family> RotatingDecoder<F> {
             family,
             lasers: lasers.collect(),
             settings,
+            taken: None,
         }
+    }
+
+    /// The packet that follows, where its first block is of the firing of this packet's last one.
+    fn shared<'a>(
+        &self,
+        view: &View<'_>,
+        turn: &Turn,
+        following: Option<Following<'a>>,
+    ) -> Option<(View<'a>, u32)> {
+        let following = following.filter(|_| turn.has_tail())?;
+        let next = View::new(following.payload, self.family.layout())?;
+        let is_shared = self.family.returns(&next) == self.family.returns(view)
+            && Turn::of(&self.family, &next, 0.0).has_lead()
+            && next.azimuth(0) == view.azimuth(view.blocks() - 1);
+        is_shared.then_some((next, following.packet))
     }
 
     /// The mode of a packet: what the unit says, unless the packet has another number of returns.
@@ -430,6 +495,16 @@ impl<F: Family> RotatingDecoder<F> {
 
 impl<F: Family> Decoder for RotatingDecoder<F> {
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
+        self.decode_before(payload, None, place, out);
+    }
+
+    fn decode_before(
+        &mut self,
+        payload: &[u8],
+        following: Option<Following<'_>>,
+        place: Place,
+        out: &mut Decoded,
+    ) {
         let Some(view) = View::new(payload, self.family.layout()) else {
             return out.drops.add("packet_size", 1);
         };
@@ -443,7 +518,13 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             self.family.unit_m(&view),
             self.mode_of(self.family.returns(&view)),
         );
-        visit(&self.family, &view, &turn, |shot| {
+        let shared = self.shared(&view, &turn, following);
+        let ends = Ends {
+            is_lead_taken: self.taken == Some(place.packet),
+            next: shared.map(|(next, _)| next),
+        };
+        self.taken = shared.map(|(_, packet)| packet);
+        visit(&self.family, &view, &turn, ends, |shot| {
             let Some(laser) = self.lasers.get(shot.slot.laser) else {
                 return;
             };
@@ -455,6 +536,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                 let Some(kind) = kind else { continue };
                 let echo = shot.echoes[index];
                 let range_m = f64::from(echo.range) * unit_m;
+                let other = self.taken.filter(|_| shot.is_shared && index == 1);
                 out.cloud.push(&Return {
                     xyz_m: self.position(laser, range_m, azimuth_rad),
                     time: place.time + turn.start_ns(shot.firing) + shot.slot.delay_ns,
@@ -464,7 +546,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                     intensity: echo.intensity.into(),
                     return_index: index as u8,
                     return_kind: *kind,
-                    packet: place.packet,
+                    packet: other.unwrap_or(place.packet),
                     block: shot.blocks[index] as u16,
                 });
                 out.encoder_rad.push(wrapped(encoder_rad));

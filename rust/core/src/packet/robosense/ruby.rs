@@ -1,7 +1,7 @@
 //! RoboSense Ruby and Ruby Plus with 128, 80 or 48 lasers.
 //!
 //! With 128 lasers three blocks make a packet, so that the two blocks of a firing in dual return may lie in two
-//! packets; what pairs within one packet is judged as a pair, the rest stands alone.
+//! packets; they are judged as a pair all the same, unless one of the packets is lost.
 //!
 //! Source: manual of the Ruby Plus and the maker's driver. Which of the two returns comes first, the sources
 //! do not agree on; distance tells.

@@ -21,6 +21,8 @@ pub struct Turn {
     firings: usize,
     /// The first block is the second one of a firing that began in the packet before.
     lead: usize,
+    /// Blocks of the last firing that the next packet has.
+    tail: usize,
     azimuth_centideg: [u32; MOST],
     /// Usual step from firing to firing.
     step_rad: f64,
@@ -32,6 +34,8 @@ pub struct Turn {
     /// Step behind the last firing and before a gap.
     last_step_rad: f64,
     is_on_grid: bool,
+    /// Whole packets may end within a firing.
+    is_splitting: bool,
 }
 
 impl Turn {
@@ -43,6 +47,7 @@ impl Turn {
             first: [0; MOST + 1],
             firings: 0,
             lead: 0,
+            tail: 0,
             azimuth_centideg: [0; MOST],
             step_rad: 0.0,
             gap: None,
@@ -50,6 +55,7 @@ impl Turn {
             firing_ns: family.firing_ns(returns),
             last_step_rad: 0.0,
             is_on_grid: family.is_on_grid(),
+            is_splitting: !view.layout().blocks.is_multiple_of(full),
         };
         turn.find_firings(view, full);
         turn.find_steps();
@@ -88,6 +94,8 @@ impl Turn {
         self.first[self.firings] = blocks;
         if self.firings > 1 {
             self.lead = full.saturating_sub(self.first[1]);
+            let last = blocks - self.first[self.firings - 1];
+            self.tail = full.saturating_sub(last);
         }
     }
 
@@ -129,6 +137,16 @@ impl Turn {
         (first..self.first[firing + 1]).map(move |block| (block, block - first + lead))
     }
 
+    /// Whether the first firing began in the packet before.
+    pub fn has_lead(&self) -> bool {
+        self.lead > 0
+    }
+
+    /// Whether the last firing goes on in the next packet.
+    pub fn has_tail(&self) -> bool {
+        self.is_splitting && self.tail > 0
+    }
+
     /// Encoder azimuth of a firing, [0, 2 pi).
     pub fn azimuth_rad(&self, firing: usize) -> f64 {
         f64::from(self.azimuth_centideg[firing]) * RAD_PER_CENTIDEG
@@ -168,19 +186,10 @@ impl Turn {
         self.step_rad / self.firing_ns
     }
 
-    /// Firings that the packet stands for: one that it shares with another counts by its blocks.
+    /// Firings until the next packet starts, which is at the last firing where that one goes on in it.
     fn whole_firings(&self) -> f64 {
-        let firings = self.firings as f64;
-        let last = self.firings.saturating_sub(1);
-        let size = |firing: usize| (self.first[firing + 1] - self.first[firing]) as f64;
-        let most = (0..self.firings).map(size).fold(1.0, f64::max);
-        let short = (1.0 - size(0) / most)
-            + if last > 0 {
-                1.0 - size(last) / most
-            } else {
-                0.0
-            };
-        firings - short
+        let shared = usize::from(self.has_tail());
+        self.firings.saturating_sub(shared) as f64
     }
 
     /// Angle from the first shot to where the next packet starts.
