@@ -18,7 +18,7 @@ test-rust: cargo
 	cargo test --release --quiet
 
 test-python: $(VENV)/built $(VENV)/tested
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 lint: $(VENV)/built $(VENV)/tested cargo ## format, lints and types, changing nothing
 	cargo fmt --all --check

@@ -16,6 +16,12 @@ SCRATCH = tempfile.TemporaryDirectory(prefix="lidar-deflect-tests-")
 """Where commands run that are given no other place, so that none writes into the project."""
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Start with the files of slow tests, so that no worker is left alone with one at the end."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 @dataclass(frozen=True)
 class Finished:
     """What a command left behind."""
