@@ -149,6 +149,7 @@ fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<F
     let plan = FramePlan {
         lidars: (0..poses.len()).collect(),
         poses: poses.to_vec(),
+        moves: Vec::new(),
         cut_azimuth_rad: vec![0.0; poses.len()],
         pass: PassThrough::new([-5.0, -4.0, 70.0], [12.0, 6.0, 111.0]).unwrap(),
         first: START + PERIOD_NS,

@@ -230,6 +230,7 @@ class FramePlan:
         period_ns: int,
         start_ns: int,
         stop_ns: int,
+        moves: Sequence[tuple[int, int, int, list[list[float]]]] = ...,
     ) -> FramePlan: ...
 
 @final
@@ -407,6 +408,7 @@ class BeamFeed:
         cut_azimuth_deg: Sequence[float],
         box_m: NDArray[np.float64],
         windows_ns: Sequence[tuple[int, int]],
+        moves: Sequence[tuple[int, int, int, list[list[float]]]] = ...,
     ) -> BeamFeed: ...
     def take(
         self, count: int, progress: Callable[[int, int], None] | None = None

@@ -5,7 +5,7 @@ The order of a measurement, one line per step, stands in `Test.measure`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
     from lidar_deflect.checks import Finding
     from lidar_deflect.config import Config
+    from lidar_deflect.drift import Drift
     from lidar_deflect.holds import Hold
     from lidar_deflect.matching import Match
     from lidar_deflect.measurement import Inputs, States
@@ -157,15 +158,17 @@ class Test:
         limits = opened.limits_ns(start_s, stop_s)
         watch.lap("scan")
         name = method or self.config.measure.method
-        inputs, states = self._states(opened, calibration, name, limits, rate_hz, watch)
+        inputs, states, drifted = self._states(opened, calibration, name, limits, rate_hz, watch)
         matches = matching.match(opened, inputs, states)
         shifts = matching.shifts_of(matches)
         watch.lap("clocks")
         if shifts:  # the load says where the unloaded hold is: look again by the right clock
             opened = opened.with_shifts(shifts)
             if self.config.load.file in shifts:
-                inputs, states = self._states(opened, calibration, name, limits, rate_hz, watch)
-        return result_of(opened, inputs, states, name, watch, matches)
+                inputs, states, drifted = self._states(
+                    opened, calibration, name, limits, rate_hz, watch
+                )
+        return result_of(opened, inputs, states, drifted, name, watch, matches)
 
     def _states(
         self,
@@ -175,8 +178,8 @@ class Test:
         limits: tuple[int, int],
         rate_hz: float | None,
         watch: provenance.Stopwatch,
-    ) -> tuple[Inputs, States]:
-        """Calibrate where that is still to be done, then measure by one method."""
+    ) -> tuple[Inputs, States, Drift]:
+        """Calibrate where that is still to be done, watch the tripods, measure by one method."""
         known = self._known(calibration, opened, opened.progress, opened.threads)
         window = opened.unloaded_or_kept_ns(known)
         clouds = unloaded.collect_all(opened.capture, opened.lidars, window) if window else {}
@@ -186,9 +189,12 @@ class Test:
             clouds, window = {}, None
         watch.lap("calibrate")
         inputs = opened.inputs(known, clouds, window, limits=limits, rate_hz=rate_hz)
-        states = _method(name)(inputs)
+        drifted = drift.watch(inputs)
+        inputs = replace(inputs, moves=drifted.moves)
+        watch.lap("drift")
+        states = drift.marked(_method(name)(inputs), drifted)
         watch.lap("measure")
-        return inputs, states
+        return inputs, states, drifted
 
     def _known(
         self,
@@ -227,6 +233,7 @@ def result_of(
     opened: OpenedTest,
     inputs: Inputs,
     states: States,
+    drifted: Drift,
     method: str,
     watch: provenance.Stopwatch,
     matches: Sequence[Match] = (),
@@ -238,8 +245,6 @@ def result_of(
     wires = instruments.wires(opened.config, first_ns, opened.shifts)
     deflection = tabulate.deflection(states, holds, load=opened.load, root=root, first_ns=first_ns)
     health = health_table(opened.capture, inputs.lidars, states)
-    drifted = drift.watch(inputs)
-    watch.lap("drift")
     settings = opened.config.model_dump()
     others = instruments.others(opened.config, first_ns, opened.shifts)
     given = [*([opened.load] if opened.load else []), *wires, *root, *others]

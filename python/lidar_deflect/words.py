@@ -331,6 +331,7 @@ REASONS = {
     "stretched": "the sections lie farther apart than the blade is long",
     "before_first_line": "the section lies before the first scan line",
     "few_points": "too few points on the blade",
+    "moved": "a lidar's tripod was moved",
     "few_samples": "too few samples of its edges",
     "no_intersection": "the contour curves do not meet",
     "off_the_line": "the samples lie off a common line",

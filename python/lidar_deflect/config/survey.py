@@ -51,5 +51,5 @@ class Calibrate(Model):
     range_scale_u: NotNegative = Field(default=1e-4, description="prior sigma of the range scale")
     drift: Literal["follow", "mark"] = Field(
         default="follow",
-        description="a tripod that moves in the test: mark | follow (as yet marked, too)",
+        description="a tripod that moves in the test: follow to its new pose | mark the results",
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -15,9 +15,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidar_deflect.capture import Sweep
+    from lidar_deflect.drift.echoes import Kept
     from lidar_deflect.measurement.unloaded import HoldCloud
 
     Floats = NDArray[np.float64]
+    Echoes: TypeAlias = HoldCloud | Sweep | Kept
 
 STEP_DEG = 0.5
 """Echoes are added up in azimuth cells of this size, per channel."""
@@ -27,6 +29,9 @@ NEAR_M = 0.4
 
 GATE_M, GATE_RAD = 0.06, 0.006
 """Echoes farther from their cell's height (this, and this by the range) are something else."""
+
+PATCH_M = 1.5
+"""Size of patches of a surface whose roughness is taken to be independent."""
 
 MIN_SEEN, MIN_ECHOES, MIN_CELLS = 4, 3, 60
 """Echoes of a cell in the reference and in a window; cells that a pose can be told from."""
@@ -66,8 +71,10 @@ class Cells:
         Mean height of its echoes above the plane in the reference, their scatter and number.
     normals
         Of the planes, world axes, shape (planes, 3).
-    frames
-        Of the planes, sensor frame: normal and offset, shape (planes, 4).
+    offsets_m
+        Of the planes along their normals, world frame, shape (planes,).
+    pose
+        World from sensor in the reference, shape (4, 4).
     """
 
     plane: NDArray[np.intp]
@@ -76,24 +83,24 @@ class Cells:
     sigma_m: Floats
     count: NDArray[np.intp]
     normals: Floats
-    frames: Floats
+    offsets_m: Floats
+    pose: Floats
 
     @classmethod
     def of(cls, cloud: HoldCloud, pose: Floats, planes: Sequence[Plane]) -> Cells:
         """Find the static cells of a reference hold, seen from `pose` (world from sensor)."""
-        key = _keys(cloud)
+        key = keys(cloud)
         size = (int(key.max(initial=0)) // TURN + 1) * TURN
         count = np.bincount(key, minlength=size)
         sums = [np.bincount(key, cloud.xyz[:, k], size) for k in range(3)]
         ray = (np.stack(sums, axis=1) / np.maximum(count, 1)[:, None]) @ pose[:3, :3].T
         normals = np.array([plane.normal for plane in planes])
-        offsets = np.array([plane.offset_m for plane in planes]) - normals @ pose[:3, 3]
-        frames = np.hstack([normals @ pose[:3, :3], offsets[:, None]])
+        offsets = np.array([plane.offset_m for plane in planes])
         plane = np.where(count < MIN_SEEN, -1, _plane_of(ray + pose[:3, 3], planes))
         start = np.zeros(size)
-        cells = cls(plane, ray, start, start, count, normals, frames)
+        cells = cls(plane, ray, start, start, count, normals, offsets, pose)
         for gate_m in (NEAR_M, 0.0):  # about the plane, then about that mean: movers drop out
-            sums_ = Sums(cells, gate_m)
+            sums_ = Sums(cells, wider_m=gate_m)
             sums_.add(cloud)
             cells = sums_.as_reference()
         return cells._without_rough()
@@ -109,29 +116,54 @@ class Cells:
         """How many cells can be watched."""
         return int((self.plane >= 0).sum())
 
+    def watches(self, echoes: Echoes) -> NDArray[np.bool_]:
+        """Tell which echoes fall into a cell that is watched, shape (n,)."""
+        key = keys(echoes)
+        inside = key < len(self.plane)
+        return np.asarray(inside & (self.plane[np.where(inside, key, 0)] >= 0))
+
+    def away_m(self, echoes: Echoes, pose: Floats) -> tuple[NDArray[np.intp], Floats]:
+        """Cell of every echo that has one, and how far above the reference it lies from `pose`.
+
+        Returns
+        -------
+        tuple
+            Cells, -1 for echoes on none, shape (n,); heights in metres, NaN there.
+        """
+        key = keys(echoes)
+        on = np.flatnonzero(self.watches(echoes))
+        plane = self.plane[key[on]]
+        normal = (self.normals @ pose[:3, :3])[plane]
+        beneath = (self.offsets_m - self.normals @ pose[:3, 3])[plane]
+        height = np.einsum("ij,ij->i", echoes.xyz[on], normal) - beneath
+        cell = np.full(len(key), -1, dtype=np.intp)
+        away = np.full(len(key), np.nan)
+        cell[on], away[on] = key[on], height - self.height_m[key[on]]
+        return cell, away
+
+    def gate_m(self) -> Floats:
+        """How far from its cell's height an echo may lie, shape (cells,)."""
+        return np.asarray(GATE_M + GATE_RAD * np.linalg.norm(self.ray_m, axis=1))
+
 
 class Sums:
-    """Heights of one window, added up by cell."""
+    """Heights of one stretch of time as seen from one pose, added up by cell."""
 
-    def __init__(self, cells: Cells, wider_m: float = 0.0) -> None:
+    def __init__(
+        self, cells: Cells, pose: Floats | None = None, wider: float = 1.0, wider_m: float = 0.0
+    ) -> None:
         size = len(cells.plane)
         self._cells = cells
-        range_m = np.linalg.norm(cells.ray_m, axis=1)
-        self._gate_m = np.maximum(GATE_M + GATE_RAD * range_m, wider_m)
+        self._pose = cells.pose if pose is None else pose
+        self._gate_m = np.maximum(wider * cells.gate_m(), wider_m)
         self._count = np.zeros(size, dtype=np.intp)
         self._sum, self._squares = np.zeros(size), np.zeros(size)
 
-    def add(self, echoes: HoldCloud | Sweep) -> None:
+    def add(self, echoes: Echoes) -> None:
         """Add the echoes of a sweep or of many."""
-        cells, key = self._cells, _keys(echoes)
-        size = len(cells.plane)
-        on = np.flatnonzero(key < size)
-        on = on[cells.plane[key[on]] >= 0]
-        key = key[on]
-        frame = cells.frames[cells.plane[key]]
-        height = np.einsum("ij,ij->i", echoes.xyz[on], frame[:, :3]) - frame[:, 3]
-        away = height - cells.height_m[key]
-        clear = np.abs(away) < self._gate_m[key]
+        size = len(self._cells.plane)
+        key, away = self._cells.away_m(echoes, self._pose)
+        clear = np.abs(away) < self._gate_m[key]  # nothing lies beside NaN
         key, away = key[clear], away[clear]
         self._count += np.bincount(key, minlength=size)
         self._sum += np.bincount(key, away, size)
@@ -146,8 +178,13 @@ class Sums:
         height = self._cells.height_m + mean
         return replace(self._cells, plane=plane, height_m=height, sigma_m=spread, count=self._count)
 
+    @property
+    def seen(self) -> int:
+        """How many cells were seen."""
+        return int(((self._count >= MIN_ECHOES) & (self._cells.plane >= 0)).sum())
+
     def change(self) -> Change | None:
-        """Change of pose since the reference; None where too few cells were seen."""
+        """Change since the pose seen from; None where too few cells were seen."""
         cells = self._cells
         seen = np.flatnonzero((self._count >= MIN_ECHOES) & (cells.plane >= 0))
         if len(seen) < MIN_CELLS:
@@ -157,10 +194,18 @@ class Sums:
         variance = scatter**2 * (1.0 / self._count[seen] + 1.0 / cells.count[seen])
         height = self._sum[seen] / self._count[seen]
         normal = cells.normals[cells.plane[seen]]
-        return estimate(cells.ray_m[seen], normal, height, np.sqrt(variance + FLOOR_M**2))
+        sigma = np.sqrt(variance + FLOOR_M**2)
+        return estimate(cells.ray_m[seen], normal, height, sigma, patches(cells, seen))
 
 
-def _keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
+def patches(cells: Cells, seen: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Tell on which patch each cell lies, by number: roughness is alike within one."""
+    place = np.floor(cells.ray_m[seen] / PATCH_M).astype(np.intp)
+    patch = np.column_stack([cells.plane[seen], place])
+    return np.asarray(np.unique(patch, axis=0, return_inverse=True)[1], dtype=np.intp).ravel()
+
+
+def keys(echoes: Echoes) -> NDArray[np.intp]:
     """Cell of every echo: channel, then azimuth."""
     azimuth = np.nan_to_num(echoes.azimuth_deg) / np.float32(STEP_DEG)
     step = np.floor(azimuth).astype(np.intp) % TURN

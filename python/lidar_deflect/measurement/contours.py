@@ -76,6 +76,7 @@ def _frame_plan(inputs: Inputs, plan: Plan) -> _native.FramePlan:
         period_ns=inputs.period_ns,
         start_ns=inputs.start_ns,
         stop_ns=inputs.stop_ns,
+        moves=inputs.native_moves,
     )
 
 

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from lidar_deflect.capture import Capture
     from lidar_deflect.channels import Channel
     from lidar_deflect.config import Config
+    from lidar_deflect.drift.move import Move
     from lidar_deflect.measurement.unloaded import HoldCloud
 
     Progress = Callable[[str, int, int], None]
@@ -41,6 +42,8 @@ class Inputs:
         Load in percent by the clock of the lidars; None without a channel.
     progress
         Told the stage, what is done and what there is to do.
+    moves
+        Tripods that were moved and stand elsewhere from then on, in order of time.
     """
 
     config: Config
@@ -55,6 +58,7 @@ class Inputs:
     load: Channel | None = None
     progress: Progress | None = None
     threads: int | None = None
+    moves: tuple[Move, ...] = ()
 
     @property
     def period_ns(self) -> int:
@@ -68,8 +72,22 @@ class Inputs:
 
     @property
     def poses(self) -> NDArray[np.float64]:
-        """World from sensor of every lidar, shape (lidars, 4, 4)."""
+        """World from sensor of every lidar at first, shape (lidars, 4, 4)."""
         return np.array([self.calibration.pose(id).world_from_sensor for id in self.lidars])
+
+    @property
+    def stands(self) -> NDArray[np.intp]:
+        """Place of the lidar of every stand: the lidars as calibrated, then where each moved to."""
+        moved = [self.lidars.index(move.lidar) for move in self.moves]
+        return np.array([*range(len(self.lidars)), *moved], dtype=np.intp)
+
+    @property
+    def native_moves(self) -> list[tuple[int, int, int, list[list[float]]]]:
+        """The moves as the core takes them."""
+        return [
+            (self.lidars.index(m.lidar), m.left_ns, m.from_ns, m.world_from_sensor.tolist())
+            for m in self.moves
+        ]
 
     def listener(self, stage: str) -> Callable[[int, int], None] | None:
         """Return who is told the progress of one stage, or None where nobody listens."""

@@ -151,6 +151,7 @@ POSES = Table(
         *(Column(f"ur{a}_mrad", F64, "mrad", f"its uncertainty (k = 1), {a}", True) for a in "xyz"),
         *(Column(f"ut{a}_mm", F64, "mm", f"its uncertainty (k = 1), {a}", True) for a in "xyz"),
         Column("moved", pl.Boolean(), "name", "whether the change is beyond its uncertainty"),
+        Column("followed", pl.Boolean(), "name", "whether states take it into account"),
     ),
 )
 CHANNELS = Table(

@@ -11,6 +11,7 @@ pub mod time;
 pub mod cloud;
 pub mod frame;
 mod simd;
+pub mod stand;
 
 pub mod capture;
 pub mod clock;

@@ -10,6 +10,8 @@ use pyo3::prelude::*;
 
 use crate::error::BorderResult;
 use lidar_deflect_core::error::InvalidValue;
+use lidar_deflect_core::frame::WorldFromSensor;
+use lidar_deflect_core::stand::Move;
 
 /// A cloud as it comes: positions as stored or as computed.
 #[derive(pyo3::FromPyObject)]
@@ -122,6 +124,23 @@ pub fn matrices(
     let fits = array.shape() == [count, 4, 4];
     let flat = flat(name, "one 4 x 4 matrix per lidar in C order", fits, array)?;
     Ok(flat.chunks_exact(16).map(Matrix4::from_row_slice).collect())
+}
+
+/// A tripod that was moved: its lidar, when it left, since when it stands again, the pose there.
+pub type MoveRow = (usize, i64, i64, [[f64; 4]; 4]);
+
+/// Reads moves; their poses are checked.
+pub fn moves(rows: &[MoveRow]) -> BorderResult<Vec<Move>> {
+    let read = |(lidar, left_ns, from_ns, pose): &MoveRow| {
+        let matrix = Matrix4::from_fn(|row, column| pose[row][column]);
+        Ok(Move {
+            lidar: *lidar,
+            left_ns: *left_ns,
+            from_ns: *from_ns,
+            pose: WorldFromSensor::from_matrix(&matrix)?,
+        })
+    };
+    rows.iter().map(read).collect()
 }
 
 /// Refuses another number of rows than expected.

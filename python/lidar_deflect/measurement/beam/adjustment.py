@@ -102,6 +102,7 @@ def reading(inputs: Inputs, plan: Plan, windows_ns: Sequence[tuple[int, int]]) -
         cut_azimuth_deg=plan.cuts_deg(inputs.lidars),
         box_m=np.ascontiguousarray(plan.box_m),
         windows_ns=list(windows_ns),
+        moves=inputs.native_moves,
     )
 
 
@@ -205,4 +206,12 @@ def _settle(
             listener(steps, total)
     if listener:
         listener(total, total)
-    return told, steps
+    return told | {"holds": [by_lidar(hold, inputs) for hold in told["holds"]]}, steps
+
+
+def by_lidar(told: Mapping[str, Any], inputs: Inputs) -> Mapping[str, Any]:
+    """Give what became of the data by number of the lidar instead of that of its stand."""
+    of = inputs.stands.astype(np.uint32)
+    met = {"lidar": of[told["lidar"]]}
+    rejected = {"lidar": of[told["rejected"]["lidar"]]}
+    return {**told, **met, "rejected": {**told["rejected"], **rejected}}

@@ -36,7 +36,8 @@ def contradictions(inputs: Inputs, solved: Solved) -> list[str]:
             f"the adjustment did not settle: its last step was {solved.told['largest']:.2f} of a "
             "prior deviation"
         )
-    for lidar, noise_m in zip(inputs.lidars, solved.told["noise_m"], strict=True):
+    lidars = [inputs.lidars[place] for place in inputs.stands]
+    for lidar, noise_m in zip(lidars, solved.told["noise_m"], strict=True):
         if noise_m > NOISE_M:
             found.append(f"lidar {lidar}: residuals scatter by {1e3 * noise_m:.0f} mm")
     for hold, told in zip(solved.holds, solved.told["holds"], strict=True):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect.measurement.beam.adjustment import LAST, reading
+from lidar_deflect.measurement.beam.adjustment import LAST, by_lidar, reading
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -87,10 +87,11 @@ def follow(
         for inside, result in zip(part, states, strict=True):
             if result is None or not _fits(result[2]):
                 continue
+            told = by_lidar(result[2], inputs)
             values[inside] = result[0].reshape(len(inside), len(s_m), 4)
             noise[inside] = result[1].reshape(len(inside), len(s_m), 4)
-            used[inside] = _count(result[2], times_ns[inside], half_ns, len(inputs.lidars))
-            points.append(result[2])
+            used[inside] = _count(told, times_ns[inside], half_ns, len(inputs.lidars))
+            points.append(told)
         if listener:
             listener(start + len(part), len(stretches))
     return Followed(values, noise, used, in_hold, _joined(points))

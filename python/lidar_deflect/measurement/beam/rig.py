@@ -55,9 +55,24 @@ def rig_prior(inputs: Inputs) -> RigPrior:
     joint: Any = getattr(inputs.calibration, "joint", None)
     if joint is not None:
         _take_joint(joint, inputs.lidars, channels, values, covariance)
-    return RigPrior(
+    known = RigPrior(
         np.array([pose.world_from_sensor for pose in poses]), channels, values, covariance
     )
+    return _with_moves(known, inputs) if inputs.moves else known
+
+
+def _with_moves(known: RigPrior, inputs: Inputs) -> RigPrior:
+    """Add a stand for every move: the same lidar, its pose less well known by the move's."""
+    starts = _starts(known.channels)
+    channels = [known.channels[lidar] for lidar in inputs.stands]
+    places = [range(starts[lidar], starts[lidar + 1]) for lidar in inputs.stands]
+    same = np.concatenate([np.array(own) for own in places])
+    covariance = known.covariance[np.ix_(same, same)]
+    for move, start in zip(inputs.moves, _starts(channels)[len(known.channels) :], strict=False):
+        own = slice(start, start + 6)
+        covariance[own, own] += move.covariance
+    poses = [*known.poses, *(move.world_from_sensor for move in inputs.moves)]
+    return RigPrior(np.array(poses), channels, known.values[same], covariance)
 
 
 def _channels(inputs: Inputs, lidar: str) -> int:

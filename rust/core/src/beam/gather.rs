@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use nalgebra::{Point3, Vector3};
 
 use super::echoes::{LineEcho, Seen, add_line};
-use crate::frame::WorldFromSensor;
 use crate::paper::passthrough::PassThrough;
-use crate::sweep::Sweep;
+use crate::stand::{Stand, Stands};
+use crate::sweep::{Gap, Sweep};
 
 /// A window no longer waits for a lidar that is so far behind the others: it has fallen silent.
 const PATIENCE_NS: i64 = 60_000_000_000;
@@ -15,7 +15,7 @@ const PATIENCE_NS: i64 = 60_000_000_000;
 /// Collects what is seen of the blade in given stretches of time, each handed over when it is complete.
 #[derive(Debug)]
 pub struct Gather {
-    poses: Vec<WorldFromSensor>,
+    stands: Vec<Stands>,
     pass: PassThrough,
     open: VecDeque<Window>,
     /// Start of the last sweep of each lidar.
@@ -30,22 +30,22 @@ struct Window {
 }
 
 impl Gather {
-    /// For lidars with these poses, points inside the box, and windows in the order of their starts.
-    pub fn new(poses: Vec<WorldFromSensor>, pass: PassThrough, windows_ns: &[(i64, i64)]) -> Self {
+    /// For lidars that stand there, points inside the box, and windows in the order of their starts.
+    pub fn new(stands: Vec<Stands>, pass: PassThrough, windows_ns: &[(i64, i64)]) -> Self {
         let window = |span_ns: &(i64, i64)| Window {
             span_ns: *span_ns,
             seen: Seen::default(),
         };
         Self {
-            reached_ns: vec![i64::MIN; poses.len()],
-            poses,
+            reached_ns: vec![i64::MIN; stands.len()],
+            stands,
             pass,
             open: windows_ns.iter().map(window).collect(),
             has_ended: false,
         }
     }
 
-    /// Takes the next sweep of a lidar by its number among the poses.
+    /// Takes the next sweep of a lidar by its number among the stands; what is seen goes by number of the stand.
     pub fn push(&mut self, sweep: &Sweep) {
         self.reached_ns[sweep.lidar] = sweep.start.0;
         for window in &mut self.open {
@@ -55,23 +55,17 @@ impl Gather {
             if sweep.start.0 > window.span_ns.1 {
                 continue;
             }
-            let pose = &self.poses[sweep.lidar];
-            for (ring, line) in lines(sweep, pose, &self.pass, window.span_ns) {
-                let is_gap = |from: i64, to: i64| {
-                    sweep
-                        .gaps
-                        .iter()
-                        .any(|gap| gap.from.0 <= to && from <= gap.to.0)
-                };
-                let period_ns = shot_period_ns(&line);
-                add_line(
-                    &mut window.seen,
-                    sweep.lidar,
-                    ring,
-                    &line,
-                    period_ns,
-                    is_gap,
-                );
+            let stands = &self.stands[sweep.lidar];
+            let is_gap = |from: i64, to: i64| {
+                let lost = |gap: &Gap| gap.from.0 <= to && from <= gap.to.0;
+                sweep.gaps.iter().any(lost) || stands.moves_within(from, to)
+            };
+            for stand in stands.iter() {
+                for (ring, line) in lines(sweep, stand, &self.pass, window.span_ns) {
+                    let period_ns = shot_period_ns(&line);
+                    let (seen, number) = (&mut window.seen, stand.number);
+                    add_line(seen, number, ring, &line, period_ns, is_gap);
+                }
             }
         }
     }
@@ -94,14 +88,17 @@ impl Gather {
     }
 }
 
-/// Echoes of a sweep inside the box and the window, by beam, in the order of the shots.
+/// Echoes of a sweep inside the box, the window and a stand, by beam, in the order of the shots.
 fn lines(
     sweep: &Sweep,
-    world_from_sensor: &WorldFromSensor,
+    stand: &Stand,
     pass: &PassThrough,
     window_ns: (i64, i64),
 ) -> Vec<(usize, Vec<LineEcho>)> {
     let cloud = &sweep.cloud;
+    if !stand.meets(sweep.start.0, sweep.end.0) {
+        return Vec::new();
+    }
     let rings = cloud
         .ring
         .iter()
@@ -113,8 +110,11 @@ fn lines(
         if cloud.return_index[index] > 0 || time_ns < window_ns.0 || time_ns > window_ns.1 {
             continue;
         }
+        if !stand.holds(time_ns) {
+            continue;
+        }
         let sensor = Point3::from(xyz.map(f64::from));
-        let world = world_from_sensor.transform(&sensor);
+        let world = stand.pose.transform(&sensor);
         if pass.contains(&[world.x as f32, world.y as f32, world.z as f32]) {
             let xyz_m: Vector3<f64> = sensor.coords;
             lines[usize::from(cloud.ring[index])].push(LineEcho { time_ns, xyz_m });
@@ -144,6 +144,7 @@ fn shot_period_ns(line: &[LineEcho]) -> f64 {
 mod tests {
     use super::*;
     use crate::cloud::PointCloud;
+    use crate::frame::WorldFromSensor;
     use crate::time::Timestamp;
     use nalgebra::Rotation3;
 
@@ -151,8 +152,9 @@ mod tests {
 
     fn gather(windows: &[(i64, i64)]) -> Gather {
         let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::zeros());
+        let stands = Stands::of(&[pose; 2], &[]).unwrap();
         let pass = PassThrough::new([-1.0; 3], [1.0; 3]).unwrap();
-        Gather::new(vec![pose; 2], pass, windows)
+        Gather::new(stands, pass, windows)
     }
 
     fn sweep(lidar: usize, start: i64) -> Sweep {

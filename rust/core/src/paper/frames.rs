@@ -6,7 +6,7 @@ use nalgebra::Point3;
 
 use super::passthrough::PassThrough;
 use crate::error::InvalidValue;
-use crate::frame::WorldFromSensor;
+use crate::stand::Stands;
 use crate::sweep::{Gap, Sweep};
 use crate::time::Timestamp;
 
@@ -144,19 +144,18 @@ fn nearest(queue: &mut VecDeque<(Timestamp, Share)>, time: Timestamp, reach_ns: 
         .unwrap_or_default()
 }
 
-/// What a sweep gives to a frame, and its middle.
-pub fn share_of(
-    sweep: &Sweep,
-    world_from_sensor: &WorldFromSensor,
-    pass: &PassThrough,
-) -> (Timestamp, Share) {
+/// What a sweep gives to a frame, and its middle. Echoes of a lidar on the move do not count.
+pub fn share_of(sweep: &Sweep, stands: &Stands, pass: &PassThrough) -> (Timestamp, Share) {
     let mut share = Share {
         present: true,
         ..Share::default()
     };
     let mut seen: Option<Gap> = None; // first and last shot that passed
     for (index, xyz) in sweep.cloud.xyz_m.iter().enumerate() {
-        let point = world_from_sensor.transform(&Point3::from(xyz.map(f64::from)));
+        let Some(stand) = stands.at(sweep.cloud.time_ns[index]) else {
+            continue; // on the move
+        };
+        let point = stand.pose.transform(&Point3::from(xyz.map(f64::from)));
         let point = [point.x as f32, point.y as f32, point.z as f32];
         if pass.contains(&point) {
             share.points_m.push(point);
@@ -180,6 +179,7 @@ pub fn share_of(
 mod tests {
     use super::*;
     use crate::cloud::{PointCloud, Return, ReturnKind};
+    use crate::frame::WorldFromSensor;
     use nalgebra::{Rotation3, Vector3};
 
     const PERIOD: i64 = 100_000_000;
@@ -221,7 +221,7 @@ mod tests {
     fn push(frames: &mut FrameAssembler, sweep: &Sweep) {
         let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::new(0.0, 0.0, 80.0));
         let pass = PassThrough::new([1.5, -1.0, 70.0], [9.0, 1.0, 90.0]).unwrap();
-        let (middle, share) = share_of(sweep, &pose, &pass);
+        let (middle, share) = share_of(sweep, &Stands::still(sweep.lidar, pose), &pass);
         frames.push(sweep.lidar, middle, share);
     }
 

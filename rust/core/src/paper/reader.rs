@@ -7,6 +7,7 @@ use super::passthrough::PassThrough;
 use crate::capture::DatagramBatch;
 use crate::error::{InvalidValue, ReadError};
 use crate::frame::WorldFromSensor;
+use crate::stand::{Move, Stands};
 use crate::stream::{ScanReport, SweepOptions, SweepReader};
 use crate::time::Timestamp;
 
@@ -20,6 +21,8 @@ pub struct FramePlan {
     pub lidars: Vec<usize>,
     /// Pose of each.
     pub poses: Vec<WorldFromSensor>,
+    /// Tripods that were moved, in order of time.
+    pub moves: Vec<Move>,
     /// Azimuth at which the sweeps of each are cut.
     pub cut_azimuth_rad: Vec<f64>,
     /// What belongs to the blade's surroundings.
@@ -65,7 +68,7 @@ pub struct FrameReader {
 
 struct Lane {
     reader: SweepReader,
-    pose: WorldFromSensor,
+    stands: Stands,
     shares: Vec<(Timestamp, Share)>,
 }
 
@@ -78,10 +81,11 @@ impl FrameReader {
         let count = plan.lidars.len();
         check_length("poses", plan.poses.len(), count)?;
         check_length("cut_azimuth_rad", plan.cut_azimuth_rad.len(), count)?;
+        let stands = Stands::of(&plan.poses, &plan.moves)?;
         let lane = |place: usize| {
             Ok(Lane {
                 reader: SweepReader::new(report, &plan.options(place))?,
-                pose: plan.poses[place],
+                stands: stands[place].clone(),
                 shares: Vec::new(),
             })
         };
@@ -136,7 +140,7 @@ impl FrameReader {
 impl Lane {
     fn take(&mut self, pass: &PassThrough) {
         while let Some(sweep) = self.reader.pop() {
-            self.shares.push(share_of(&sweep, &self.pose, pass));
+            self.shares.push(share_of(&sweep, &self.stands, pass));
             self.reader.recycle(sweep.lidar, sweep.cloud);
         }
     }

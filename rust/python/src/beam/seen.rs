@@ -4,6 +4,7 @@ use lidar_deflect_core::beam::echoes::Seen;
 use lidar_deflect_core::beam::gather::Gather;
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::paper::passthrough::PassThrough;
+use lidar_deflect_core::stand::Stands;
 use lidar_deflect_core::stream::{SweepOptions, SweepReader};
 use lidar_deflect_core::time::Timestamp;
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
@@ -45,9 +46,12 @@ pub struct BeamFeed {
 #[pymethods]
 impl BeamFeed {
     /// For lidars (numbers in the scan) with poses (lidars, 4, 4), inside of a box (2, 3), in windows
-    /// in the order of their starts.
+    /// in the order of their starts. `moves`: lidar, when it left its place, since when it has its next
+    /// one, that pose (4 x 4); what is seen from there goes by number of the move behind the lidars.
     #[new]
-    #[pyo3(signature = (scan, *, lidars, poses, cut_azimuth_deg, box_m, windows_ns))]
+    #[pyo3(signature = (
+        scan, *, lidars, poses, cut_azimuth_deg, box_m, windows_ns, moves=Vec::new()
+    ))]
     #[allow(clippy::too_many_arguments)] // keywords of Python
     fn new(
         py: Python<'_>,
@@ -57,11 +61,13 @@ impl BeamFeed {
         cut_azimuth_deg: Vec<f64>,
         box_m: PyReadonlyArray2<'_, f64>,
         windows_ns: Vec<(i64, i64)>,
+        moves: Vec<arrays::MoveRow>,
     ) -> BorderResult<Self> {
         let corners = arrays::points("box_m", &box_m)?;
         arrays::expect_rows("box_m", corners.len(), 2)?;
         let matrices = arrays::matrices("poses", &poses, lidars.len())?;
         let poses: Result<Vec<_>, _> = matrices.iter().map(WorldFromSensor::from_matrix).collect();
+        let stands = Stands::of(&poses?, &arrays::moves(&moves)?)?;
         let pass = PassThrough::new(corners[0], corners[1])?;
         let cuts_rad: Vec<f64> = cut_azimuth_deg.into_iter().map(f64::to_radians).collect();
         let options = SweepOptions {
@@ -72,7 +78,7 @@ impl BeamFeed {
         Ok(Self {
             feed: Feed::open(py, &scan.paths)?,
             reader: SweepReader::new(&scan.report, &options)?,
-            gather: Gather::new(poses?, pass, &windows_ns),
+            gather: Gather::new(stands, pass, &windows_ns),
             lidars,
             has_ended: false,
         })

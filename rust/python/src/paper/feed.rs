@@ -35,9 +35,11 @@ pub struct FramePlan {
 impl FramePlan {
     /// Frames at `first_ns` and every `period_ns` from it, of lidars by their numbers in the scan,
     /// with poses (lidars, 4, 4) and box (2, 3), from packets in [`start_ns`, `stop_ns`).
+    /// `moves`: lidar, when it left its place, since when it has its next one, that pose (4 x 4).
     #[new]
     #[pyo3(signature = (
-        scan, *, lidars, poses, cut_azimuth_deg, box_m, first_ns, period_ns, start_ns, stop_ns
+        scan, *, lidars, poses, cut_azimuth_deg, box_m, first_ns, period_ns, start_ns, stop_ns,
+        moves=Vec::new()
     ))]
     #[allow(clippy::too_many_arguments)] // keywords of Python
     fn new(
@@ -50,6 +52,7 @@ impl FramePlan {
         period_ns: i64,
         start_ns: i64,
         stop_ns: i64,
+        moves: Vec<arrays::MoveRow>,
     ) -> BorderResult<Self> {
         let corners = arrays::points("box_m", &box_m)?;
         arrays::expect_rows("box_m", corners.len(), 2)?;
@@ -57,6 +60,7 @@ impl FramePlan {
         let pose = |matrix: &Matrix4<f64>| WorldFromSensor::from_matrix(matrix);
         let plan = reader::FramePlan {
             poses: poses.iter().map(pose).collect::<Result<_, _>>()?,
+            moves: arrays::moves(&moves)?,
             lidars,
             cut_azimuth_rad: cut_azimuth_deg.into_iter().map(f64::to_radians).collect(),
             pass: PassThrough::new(corners[0], corners[1])?,
