@@ -1,0 +1,157 @@
+"""Are surveyed targets found, and do they hold the lidars as well as they are surveyed?
+
+All figures are of simulated data: two lidars, no wall, six retroreflectors surveyed to 1 mm.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import lidar_deflect as ld
+from lidar_deflect.calibrate import calibrate
+from lidar_deflect.measurement import unloaded
+from lidar_deflect.opened import OpenedTest
+from lidar_deflect.scene import Scene
+from lidar_deflect.simulation import simulate
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from lidar_deflect.calibration import Calibration
+
+PLACES = ((-6.0, 93.0), (12.0, 95.0), (-6.0, 101.0), (12.0, 103.0), (-15.0, 98.0), (21.0, 98.0))
+CHI2_95_OF_6 = 12.59
+
+
+class Yard:
+    """A simulated yard: configuration, what its lidars saw, where they stand."""
+
+    def __init__(self, kind: str, folder: Path) -> None:
+        made = simulate(_scene(kind), folder, threads=1)
+        path = made / "test.toml"
+        self.config = ld.Test.load(path).config
+        opened = OpenedTest.of(self.config, [made / "capture.pcap"], progress=None, threads=None)
+        window = opened.unloaded_ns(None, None)
+        self.clouds = dict(unloaded.collect_all(opened.capture, opened.lidars, window))
+        truth = json.loads((made / "truth_lidars.json").read_text())
+        self.truth = [np.array(lidar["world_from_sensor"]) for lidar in truth]
+
+    def calibrated(self, **changes: Any) -> Calibration:
+        return calibrate(self.config.model_copy(update=changes), self.clouds)
+
+    def errors(self, calibration: Calibration) -> NDArray[np.float64]:
+        """Truth minus estimate, shape (lidars, 6): wx wy wz tx ty tz."""
+        pairs = zip(self.truth, calibration.poses, strict=True)
+        return np.array([_error(true, pose.world_from_sensor) for true, pose in pairs])
+
+
+def _error(true: NDArray[np.float64], found: NDArray[np.float64]) -> NDArray[np.float64]:
+    skew = true[:3, :3] @ found[:3, :3].T
+    skew = skew - skew.T
+    return np.r_[skew[2, 1], skew[0, 2], skew[1, 0], 2.0 * (true - found)[:3, 3]] / 2.0
+
+
+def _scene(kind: str) -> Scene:
+    heights = (2.0, 1.5, 1.4, 2.2, 2.5, 1.8)
+    return Scene.from_document(
+        {
+            "id": f"targets-{kind}",
+            "seed": 77,
+            "ground": {"height_m": -7.0, "roughness_mm": 6.0, "correlation_m": 0.8},
+            "loading": {"levels_percent": (0.0,), "hold_s": 2.0},
+            "lidars": [
+                {
+                    "id": f"L{i + 1}",
+                    "model": model,
+                    "address": f"192.168.1.{201 + i}",
+                    "position_m": (3.0, -5.8, 94.0 + 8.0 * i),
+                    "clock": {"locked": True},
+                }
+                for i, model in enumerate(("vlp16", "xt32"))
+            ],
+            "sensors": {"noise_mm": 8.0},
+            "survey": {"ground_points": 24, "wall_points": 0, "target_mm": 1.0},
+            "targets": [
+                {
+                    "name": f"T{i + 1}",
+                    "kind": kind,
+                    "size_m": 0.4,
+                    "position_m": (x, -7.0 + heights[i], z),
+                    "facing": (3.0 - x, 0.0, 98.0 - z),
+                }
+                for i, (x, z) in enumerate(PLACES)
+            ],
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def spheres(tmp_path_factory: pytest.TempPathFactory) -> Yard:
+    return Yard("sphere", tmp_path_factory.mktemp("spheres") / "yard")
+
+
+@pytest.fixture(scope="module")
+def sheets(tmp_path_factory: pytest.TempPathFactory) -> Yard:
+    return Yard("sheet", tmp_path_factory.mktemp("sheets") / "yard")
+
+
+def test_spheres_hold_the_lidars_where_no_wall_is(spheres: Yard) -> None:
+    calibration = spheres.calibrated()
+    errors = spheres.errors(calibration)
+    for pose, error in zip(calibration.poses, errors, strict=True):
+        assert pose.covariance is not None
+        assert error @ np.linalg.solve(pose.covariance, error) < CHI2_95_OF_6
+        # Spheres of 1 mm, ten metres away on both sides: yaw to 0.1 mrad, position to 1.5 mm.
+        sigma = np.sqrt(np.diag(pose.covariance))
+        assert sigma[1] < 0.3e-3
+        assert sigma[[3, 5]].max() < 2.5e-3
+    assert np.abs(errors[:, 1]).max() < 0.5e-3
+
+
+def test_the_report_tells_who_saw_which_target(spheres: Yard) -> None:
+    calibration = spheres.calibrated()
+    seen = {t["name"]: t["echoes"] for t in calibration.evidence["targets"]}
+    assert set(seen) == {f"T{i + 1}" for i in range(6)}
+    # Beside every lidar stand two, in the middle of its rings.
+    assert {"L1"} <= set(seen["T1"]) & set(seen["T2"])
+    assert {"L2"} <= set(seen["T3"]) & set(seen["T4"])
+    assert "target T1: L1" in calibration.summary()
+
+
+def test_a_target_typed_wrong_is_named(spheres: Yard) -> None:
+    targets = list(spheres.config.targets)
+    x, y, z = targets[1].xyz_m
+    targets[1] = targets[1].model_copy(update={"xyz_m": (x, y, z + 0.1)})
+    calibration = spheres.calibrated(targets=tuple(targets))
+    said = [w for w in calibration.warnings if "was left out" in w]
+    assert len(said) == 1
+    assert said[0].startswith("target T2")
+
+
+def test_a_target_that_is_covered_is_named(spheres: Yard) -> None:
+    targets = list(spheres.config.targets)
+    targets[0] = targets[0].model_copy(update={"xyz_m": (-6.0, -1.0, 93.0)})  # nothing is there
+    calibration = spheres.calibrated(targets=tuple(targets))
+    assert any(w.startswith("target T1 is seen by no lidar") for w in calibration.warnings)
+
+
+def test_without_intensities_no_target_is_found_and_yaw_is_named(spheres: Yard) -> None:
+    dim = {id: replace(cloud, intensity=None) for id, cloud in spheres.clouds.items()}
+    calibration = calibrate(spheres.config, dim)
+    assert any("about the vertical (yaw)" in warning for warning in calibration.warnings)
+    assert calibration.is_poor
+
+
+def test_sheets_hold_the_turn_about_the_vertical(sheets: Yard) -> None:
+    calibration = sheets.calibrated()
+    for pose, error in zip(calibration.poses, sheets.errors(calibration), strict=True):
+        assert pose.covariance is not None
+        assert error @ np.linalg.solve(pose.covariance, error) < CHI2_95_OF_6
+        assert np.sqrt(pose.covariance[1, 1]) < 1e-3
