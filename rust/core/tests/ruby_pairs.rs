@@ -74,6 +74,9 @@ fn totals(order: &[usize], lost: u64) -> (u64, u64) {
     (info.points, info.merged)
 }
 
+/// Range, kind, packet and block of a point.
+type Seen = (f32, ReturnKind, u32, u16);
+
 /// 32 lasers each with one, one merged, two and two points.
 const OF_A_FIRING: u64 = 32 * (1 + 1 + 2 + 2);
 
@@ -92,7 +95,7 @@ fn pairs_are_judged_across_packets() {
         report.lidars[0].rpm
     );
     let points = reader.take().cloud;
-    let mut shots: BTreeMap<(i64, u16), Vec<(f32, ReturnKind, u32, u16)>> = BTreeMap::new();
+    let mut shots: BTreeMap<(i64, u16), Vec<Seen>> = BTreeMap::new();
     for point in points.iter() {
         let shot = shots.entry((point.time.0, point.ring)).or_default();
         shot.push((point.range_m, point.return_kind, point.packet, point.block));

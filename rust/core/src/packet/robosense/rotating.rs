@@ -302,7 +302,11 @@ impl<F: Family> Model for Rotating<F> {
     }
 
     fn is_splitting(&self) -> bool {
-        self.0.layout().blocks % self.0.blocks_of_firing(2).max(1) != 0
+        !self
+            .0
+            .layout()
+            .blocks
+            .is_multiple_of(self.0.blocks_of_firing(2).max(1))
     }
 
     fn split(&self, payload: &[u8]) -> Split {
