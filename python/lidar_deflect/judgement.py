@@ -217,8 +217,9 @@ def _pose_evidence(
     evidence: dict[str, Any] = {
         "u_rotation_mrad": (1e3 * sigma[:3]).round(3).tolist(),
         "u_position_mm": (1e3 * sigma[3:]).round(2).tolist(),
-        "ground_height_m": _ground_height_m(solution, number),
     }
+    if any(surface.name == "ground" for surface in solution.surfaces):
+        evidence["ground_height_m"] = _ground_height_m(solution, number)
     for index, surface in enumerate(solution.surfaces):
         on = raw["residuals"][mine & (raw["met_surface"] == index), 0]
         kept = on[np.isfinite(on)]
