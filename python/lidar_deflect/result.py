@@ -98,6 +98,11 @@ class Result:
         return self.frames["rejected"]
 
     @property
+    def cycles(self) -> pl.DataFrame:
+        """One row per section and cycle of a fatigue test; without rows of a static one."""
+        return self.frames["cycles"] if "cycles" in self.frames else tables.empty("cycles")
+
+    @property
     def health(self) -> pl.DataFrame:
         """Packets and points per second and lidar."""
         return self.frames["health"]

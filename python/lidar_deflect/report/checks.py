@@ -76,7 +76,7 @@ def _one_of_run(key: str, entry: Any) -> Check:
         return Check(key.replace("_", " "), flat(entry), digits.NONE, _truth(entry))
     name = str(entry.get("name") or entry.get("check") or key).replace("_", " ")
     passed = next((entry[k] for k in ("passed", "ok", "pass") if k in entry), None)
-    skipped = {"name", "check", "passed", "ok", "pass", "limit"}
+    skipped = {"name", "check", "passed", "ok", "pass", "limit", "where", "only_warns"}
     facts = {k: v for k, v in entry.items() if k not in skipped}
     shown = flat(facts["value"]) if set(facts) == {"value"} else flat(facts)
     return Check(name, shown, flat(entry.get("limit")), _truth(passed))

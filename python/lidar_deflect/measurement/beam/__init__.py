@@ -12,7 +12,8 @@ import numpy as np
 
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement.beam.adjustment import LAST, Solved, solve
-from lidar_deflect.measurement.beam.check import contradictions, objects
+from lidar_deflect.measurement.beam.budget import budget_of
+from lidar_deflect.measurement.beam.check import checks, objects
 from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
@@ -62,6 +63,7 @@ def measure(inputs: Inputs) -> States:
     uncertainty = over_time(covariance, spread, solved, expected, followed, times_ns, moved)
     of = slice(0, len(sections))
     status, reason = _grades(followed)
+    asked = checks(inputs, solved, s_m, covariance)
     every = max(1, round(inputs.rate_hz))
     return States(
         time_ns=times_ns,
@@ -87,8 +89,10 @@ def measure(inputs: Inputs) -> States:
         twist_deg=np.degrees(followed.values[:, of, 3]),
         u_twist_deg=np.degrees(uncertainty.twist_rad[:, of]),
         evidence=_evidence(expected, solved),
-        warnings=_warnings(solved),
-        failed=contradictions(inputs, solved),
+        warnings=[*_warnings(solved), *(c.text for c in asked if not c.passed and c.only_warns)],
+        failed=[c.text for c in asked if not c.passed and not c.only_warns],
+        checks=asked,
+        budget=budget_of(solved, names, s_m[of]),
     )
 
 

@@ -6,6 +6,7 @@
 
 pub mod adjust;
 pub mod axis;
+pub mod budget;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;

@@ -137,6 +137,14 @@ impl<'a> Rows<'a> {
         (self.normal, self.tally)
     }
 
+    /// The rows of the edges alone.
+    pub(super) fn of_edges(mut self) -> Normal {
+        for edge in &self.adjustment.problem.holds[self.hold].seen.edges {
+            self.add_edge(edge);
+        }
+        self.normal
+    }
+
     /// Adds one echo; gives the arc length at which it met the blade, for the next one.
     fn add_echo(&mut self, echo: &Echo, hint: Option<f64>) -> Option<f64> {
         let lidar = &self.lidars[echo.lidar];
@@ -251,6 +259,7 @@ impl<'a> Rows<'a> {
             .shape
             .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
+        row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
         row
     }
 

@@ -32,6 +32,14 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn sections(&self, s_m: &[f64], gates: &Gates) -> Result<Sections, BeamError> {
+        let (values, rows) = self.section_rows(s_m);
+        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
+        let covariance = rows.tr_mul(&factor.solve(&rows));
+        Ok(Sections { values, covariance })
+    }
+
+    /// Values of the sections of all holds and, in four columns each, their slopes by all unknowns.
+    pub(super) fn section_rows(&self, s_m: &[f64]) -> (Vec<[f64; 4]>, DMatrix<f64>) {
         let posed: Vec<Posed> = (0..self.problem.holds.len())
             .map(|hold| self.posed(hold))
             .collect();
@@ -55,9 +63,7 @@ impl Adjustment {
                 );
             }
         }
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let covariance = rows.tr_mul(&factor.solve(&rows));
-        Ok(Sections { values, covariance })
+        (values, rows)
     }
 
     /// Position and twist of a section of a hold, with their slopes in four columns from `first`.
