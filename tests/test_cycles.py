@@ -83,7 +83,8 @@ def test_growth_is_counted_and_the_steady_part_is_full() -> None:
     grows = np.clip((at_s - 5.0) / 6.0, 0.0, 1.0)
     found = cycles.find(swung(grows, at_s))
     full = (40.0 - 11.0) * FREQUENCY_HZ  # 17.9 turns
-    assert found.facts["steady"] in (int(full) - 1, int(full), int(full) + 1)
+    # Whole cycles of the full part, with one of growth at most, less the first and the last one.
+    assert found.facts["steady"] in (int(full) - 2, int(full) - 1)
     assert found.facts["count"] > found.facts["steady"]
     assert found.facts["sections"][-1]["amplitude_m"][0] == pytest.approx(AMPLITUDE_M, rel=0.01)
 

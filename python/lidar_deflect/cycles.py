@@ -6,7 +6,7 @@ most, along the direction in which it does; every section and axis is then fitte
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -25,12 +25,12 @@ LEAST_SHARE = 0.02
 """A cycle counts from this share of the largest amplitude on ..."""
 LEAST_M = 0.012
 """... if it is at least so large."""
-STEADY_SHARE = 0.95
-"""Cycles with more than this share of the usual amplitude make up the steady part."""
+STEADY_WITHIN = 0.05
+"""Cycles within this share of the usual amplitude make up the steady part ..."""
+LONG_RUN = 5
+"""... without its first and last one where there are so many."""
 FEWEST_STATES = 6
 """States in a cycle below which it cannot be told."""
-SCALE_U = 1e-3
-"""Relative standard uncertainty that amplitudes share: range scale, pose, shape of the mode."""
 DECAY_CYCLES = 4
 """A decay lasts at least so many cycles ..."""
 DECAY_SHARE = 0.8
@@ -99,6 +99,27 @@ def find(deflection: pl.DataFrame) -> Found:
     return _found(series, outer, along, phase, spans)
 
 
+def text(facts: Mapping[str, Any]) -> str:
+    """Give the whole of a fatigue test as lines for people."""
+    if not facts.get("sections"):
+        return "no cycles"
+    lines = [
+        f"{facts['count']} cycles, {facts['steady']} of them steady, at "
+        f"{facts['frequency_hz']:.5f} Hz (u {facts['ufrequency_hz']:.5f} Hz)",
+        "section   s (m)  amplitude x, y, z (m)        u (m)  mean x, y, z (m)",
+    ]
+    for own in facts["sections"]:
+        size, mean = ("".join(f"{v:9.4f}" for v in own[k]) for k in ("amplitude_m", "mean_m"))
+        u = max(own["uamplitude_m"])
+        lines.append(f"{own['section']:8} {own['s_m']:6g} {size}  {u:7.4f} {mean}")
+    lines += [
+        f"decay from {decay['from_s']:.1f} s to {decay['to_s']:.1f} s: damping ratio "
+        f"{100.0 * decay['damping_ratio']:.3f} % (u {100.0 * decay['udamping_ratio']:.3f} %)"
+        for decay in facts["decays"]
+    ]
+    return "\n".join(lines)
+
+
 def _nothing(why: str) -> Found:
     return Found(tables.empty("cycles"), {"count": 0}, (f"no cycles: {why}",))
 
@@ -135,8 +156,13 @@ def _spans(t_s: Floats, phase: Floats, amplitude: Floats) -> list[tuple[float, f
     first, last = np.flatnonzero(swings)[[0, -1]]
     turns = np.maximum.accumulate(turns[first : last + 1])
     time = time[first : last + 1]
-    whole = np.arange(np.ceil(turns[0] - 1e-6), np.floor(turns[-1] + 1e-6) + 0.5)
+    whole = np.arange(np.floor(turns[0]), np.floor(turns[-1] + 1e-6) + 0.5)
     at = np.interp(whole, turns, time)
+    # The cycle in which the swing became large enough has begun before, at the pace of the others.
+    pace_s = (time[-1] - time[0]) / max(turns[-1] - turns[0], 1e-9)
+    at[0] = time[0] - (turns[0] - whole[0]) * pace_s
+    if at[0] < t_s[0] - 0.5 * (t_s[1] - t_s[0]):
+        whole, at = whole[1:], at[1:]
     spans = zip(at[:-1], at[1:], whole[:-1], strict=True)
     return [(float(a), float(b), int(turn)) for a, b, turn in spans if b > a]
 
@@ -157,13 +183,28 @@ def _found(
     if not rows:
         return _nothing("no cycle has enough states")
     size = np.array([_along(each[3], outer, along) for each in cycles])
-    steady = size >= STEADY_SHARE * np.median(size[size >= np.median(size)])
+    steady = _steady(size)
     facts = _whole(series, outer, along, phase, cycles, steady)
     facts |= {"decays": _decays(cycles, size)}
     left = len(spans) - len(cycles)
     warnings = (f"{left} cycles have too few states and were left out",) if left else ()
     facts |= {"count": len(spans), "left_out": left}
     return Found(pl.concat(rows), facts, warnings)
+
+
+def _steady(size: Floats) -> npt.NDArray[np.bool_]:
+    """Mark the longest run of cycles near the usual amplitude, less its ends where it is long.
+
+    Those border on growth, decay or the end of the capture.
+    """
+    usual = np.median(size[size >= np.median(size)])
+    near = np.abs(size / usual - 1.0) <= STEADY_WITHIN
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], near.astype(int), [0]])))
+    start, stop = max(zip(ends[::2], ends[1::2], strict=True), key=lambda run: run[1] - run[0])
+    trim = 1 if stop - start >= LONG_RUN else 0
+    found = np.zeros(len(size), dtype=bool)
+    found[start + trim : stop - trim] = True
+    return found
 
 
 def _cycle(series: _Series, phase: Floats, start: float, stop: float) -> swing.Wave | None:
@@ -177,15 +218,15 @@ def _cycle(series: _Series, phase: Floats, start: float, stop: float) -> swing.W
 
 
 def _with_shared(fitted: swing.Wave, u_state_m: Floats) -> swing.Wave:
-    """Add what all states of a cycle share: the states' own, and a scale of amplitudes."""
-    u_amplitude = np.hypot(fitted.u_amplitude, SCALE_U * fitted.amplitude)
-    return swing.Wave(
-        fitted.mean,
-        fitted.amplitude,
-        fitted.phase_rad,
-        np.hypot(fitted.u_mean, u_state_m),
-        u_amplitude,
-        fitted.u_phase_rad,
+    """Add what all states of a cycle share.
+
+    The mean errs as a state does. The amplitude is half of crest minus trough: as if both erred
+    independently, which is an upper bound, as much of it cancels.
+    """
+    return replace(
+        fitted,
+        u_mean=np.hypot(fitted.u_mean, u_state_m),
+        u_amplitude=np.hypot(fitted.u_amplitude, u_state_m / np.sqrt(2.0)),
     )
 
 

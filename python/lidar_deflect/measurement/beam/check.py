@@ -173,7 +173,7 @@ def _strain(solved: Solved) -> Iterator[Check]:
         pick[number] = 1.0
         if number:
             pick[0] = -1.0
-        value, u = float(pick @ strain), float(np.sqrt(max(pick @ covariance @ pick, 0.0)))
+        value, u = float(pick @ strain), float(pick @ covariance @ pick) ** 0.5
         limit = max(STRAIN, STRAIN_DEVIATIONS * u)
         yield Check(
             "free axial strain" if number else "free axial strain (length of the blade)",
