@@ -29,6 +29,8 @@ STEADY_WITHIN = 0.05
 """Cycles within this share of the usual amplitude make up the steady part ..."""
 LONG_RUN = 5
 """... without its first and last one where there are so many."""
+CLEAN_TURNS = 1.5
+"""So long after it begins, the phase of a swing is no longer mixed with rest."""
 FEWEST_STATES = 6
 """States in a cycle below which it cannot be told."""
 DECAY_CYCLES = 4
@@ -93,7 +95,7 @@ def find(deflection: pl.DataFrame) -> Found:
             f"set rate_hz under [measure] to {FEWEST_STATES * coarse:.0f} or more"
         )
     phase, amplitude = swing.phase_rad(series.t_s, value, coarse)
-    spans = _spans(series.t_s, phase, amplitude)
+    spans = _spans(series.t_s, value, phase, amplitude)
     if not spans:
         return _nothing("no whole cycle was found")
     return _found(series, outer, along, phase, spans)
@@ -144,27 +146,42 @@ def _series(deflection: pl.DataFrame) -> _Series | None:
     )
 
 
-def _spans(t_s: Floats, phase: Floats, amplitude: Floats) -> list[tuple[float, float, int]]:
-    """Start and end of every whole cycle that is large enough, seconds, and number of its turn."""
-    known = ~np.isnan(phase)
-    largest = float(np.nanpercentile(amplitude, 95.0))
-    time, turns = t_s[known], phase[known] / (2.0 * np.pi)
-    least = max(LEAST_SHARE * largest, LEAST_M)
-    swings = amplitude[known] >= least
-    if not swings.any():
+def _spans(
+    t_s: Floats, value: Floats, phase: Floats, amplitude: Floats
+) -> list[tuple[float, float]]:
+    """Start and end of every whole cycle that is large enough, seconds."""
+    least = max(LEAST_SHARE * float(np.nanpercentile(amplitude, 95.0)), LEAST_M)
+    swings = np.flatnonzero(np.nan_to_num(amplitude) >= least)
+    if swings.size < FEWEST_STATES:
         return []
-    first, last = np.flatnonzero(swings)[[0, -1]]
-    turns = np.maximum.accumulate(turns[first : last + 1])
-    time = time[first : last + 1]
-    whole = np.arange(np.floor(turns[0]), np.floor(turns[-1] + 1e-6) + 0.5)
+    own = slice(swings[0], swings[-1] + 1)
+    known = ~np.isnan(phase[own])
+    time, turns = t_s[own][known], phase[own][known] / (2.0 * np.pi)
+    time, turns = _from_its_start(time, np.maximum.accumulate(turns), t_s)
+    whole = np.arange(np.ceil(turns[0] - 1e-3), np.floor(turns[-1] + 1e-6) + 0.5)
     at = np.interp(whole, turns, time)
-    # The cycle in which the swing became large enough has begun before, at the pace of the others.
-    pace_s = (time[-1] - time[0]) / max(turns[-1] - turns[0], 1e-9)
-    at[0] = time[0] - (turns[0] - whole[0]) * pace_s
-    if at[0] < t_s[0] - 0.5 * (t_s[1] - t_s[0]):
-        whole, at = whole[1:], at[1:]
-    spans = zip(at[:-1], at[1:], whole[:-1], strict=True)
-    return [(float(a), float(b), int(turn)) for a, b, turn in spans if b > a]
+    spans = [(float(a), float(b)) for a, b in pairwise(at) if b > a]
+    return [span for span in spans if _ptp(t_s, value, span) >= 2.0 * least]
+
+
+def _from_its_start(time: Floats, turns: Floats, t_s: Floats) -> tuple[Floats, Floats]:
+    """Carry the turns back to the first state, at the pace of the first cycles that are clean.
+
+    Within a period of where a swing begins, its phase is mixed with rest.
+    """
+    pace = (turns[-1] - turns[0]) / (time[-1] - time[0])
+    clean = time >= time[0] + CLEAN_TURNS / pace
+    if clean.sum() < FEWEST_STATES or time[0] <= t_s[0] + 1.0 / pace:
+        return time, turns
+    time, turns = time[clean], turns[clean]
+    pace = float(np.interp(time[0] + 2.0 / pace, time, turns) - turns[0]) / (2.0 / pace)
+    back = turns[0] - pace * (time[0] - t_s[0])
+    return np.concatenate([[t_s[0]], time]), np.concatenate([[back], turns])
+
+
+def _ptp(t_s: Floats, value: Floats, span: tuple[float, float]) -> float:
+    inside = (t_s >= span[0]) & (t_s <= span[1])
+    return float(np.ptp(value[inside])) if inside.any() else 0.0
 
 
 def _found(
@@ -172,10 +189,10 @@ def _found(
     outer: int,
     along: Floats,
     phase: Floats,
-    spans: list[tuple[float, float, int]],
+    spans: list[tuple[float, float]],
 ) -> Found:
     rows, cycles = [], []
-    for number, (start, stop, _) in enumerate(spans):
+    for number, (start, stop) in enumerate(spans):
         fitted = _cycle(series, phase, start, stop)
         if fitted is not None:
             cycles.append((number, start, stop, fitted))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from lidar_deflect import words
 from lidar_deflect.errors import InvalidValueError
 from lidar_deflect.plots.source import section_of
 
@@ -23,22 +24,6 @@ NEAR_S = 1.0
 TERMS = 3
 """Terms of the interval that are named."""
 VALUES = ("dx_m", "dy_m", "dz_m", "d_m")
-NAMES = {
-    "range_noise": "noise of single ranges",
-    "edge_steps": "step between shots at the edges",
-    "registration": "registration of the lidars",
-    "range_offsets": "range offsets, scale and elevation of the lidars",
-    "edge_angle": "angle by which edges lie outside of the silhouette",
-    "surface": "surface as built against its drawing",
-    "stiffness": "stiffness of the blade",
-    "weight_and_prebend": "weight and prebend",
-    "loads": "where and how the load enters",
-    "root": "rotation of the root",
-    "sway": "sway within the hold",
-    "reference": "unloaded state kept by the calibration",
-    "moment": "noise of this moment alone",
-}
-"""Sources of uncertainty, in words."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +191,9 @@ def _terms(
         squares["moment"] = row["ud_m"] ** 2 - whole
         whole = row["ud_m"] ** 2
     terms = [
-        Term(name, NAMES.get(name, name), square**0.5, square / whole if whole else 0.0)
+        Term(
+            name, words.BUDGET_TERMS.get(name, name), square**0.5, square / whole if whole else 0.0
+        )
         for name, square in squares.items()
     ]
     return entry["step"], tuple(sorted(terms, key=lambda term: -term.u_m))

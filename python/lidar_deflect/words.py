@@ -345,7 +345,7 @@ CHECKS_CAPTION = (
     "sum its terms, whatever the lidars say."
 )
 CHECKS_COLUMNS = {"check": "check", "found": "found", "limit": "limit", "result": "result"}
-PASSED, FAILED, UNKNOWN = "passed", "failed", "not judged"
+PASSED, FAILED, UNKNOWN, WARNS = "passed", "failed", "not judged", "look at it"
 CHECKS = {
     "hashes": "All tables come from one configuration",
     "totals": "Totals are the norms of their components",
@@ -419,6 +419,25 @@ BUDGET = {
         "beam, which changes with range and viewing angle, and the motion of the root.",
     ),
 }
+BUDGET_TERMS = {
+    "range_noise": "noise of single ranges",
+    "edge_steps": "step between shots at the edges",
+    "registration": "registration of the lidars",
+    "range_offsets": "range offsets, scale and elevation of the lidars",
+    "edge_angle": "angle by which edges lie outside of the silhouette",
+    "surface": "surface as built against its drawing",
+    "stiffness": "stiffness of the blade",
+    "weight_and_prebend": "weight and prebend",
+    "loads": "where and how the load enters",
+    "root": "rotation of the root",
+    "sway": "sway within the hold",
+    "reference": "unloaded state kept by the calibration",
+    "moment": "noise of this moment alone",
+}
+BUDGET_STEP_CAPTION = (
+    "Contributions to the expanded uncertainty (k = 2) of the total deflection at {step}, "
+    "millimetres; the root of the sum of their squares is the whole."
+)
 BUDGET_CAPTION = "Contributions to the expanded uncertainty (k = 2), as the run states them."
 NOT_CLAIMED = (
     "Not covered by any number here: a blade that differs from its drawing by more than the priors "
