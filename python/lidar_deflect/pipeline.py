@@ -259,6 +259,8 @@ def result_of(
         "poses": drifted.table,
         "channels": channels.to_table(given, first_ns),
     }
+    if states.outline:
+        frames["outline"] = _timed("outline", states.outline, first_ns)
     compared = comparison.configured(
         averages, settings, wires, instruments.prediction(opened.config)
     )

@@ -191,6 +191,14 @@ CAPTIONS = {
         "Distance of the blade's echoes from the model along the span. A trend in one lidar alone "
         "says that it stands elsewhere than believed."
     ),
+    "residual_map": (
+        "Mean distance of the blade's echoes from the model over span and chord: a patch that "
+        "stands out in colour is not shaped as the model has it."
+    ),
+    "section_cut": (
+        "Section {section} ({s_m:g} m) across its axis at {step}: surface as adjusted, its "
+        " 95 % band, and echoes within 0.3 m along the span."
+    ),
     "health": (
         "Every lidar in every second: lost packets, points on the blade, share of the turn whose "
         "packets arrived, and device clock minus UTC."
@@ -513,6 +521,13 @@ PLOT = {
     "lost": "lost (%)",
     "measured_model": "measured - model (mm)",
     "missing": "missing",
+    "no_outline": "this method gives no outline of this section",
+    "along_the_chord": "along the chord (m)",
+    "across_the_chord": "across (m)",
+    "band": "95 % band",
+    "surface": "surface",
+    "chord_suction": "chord, suction side",
+    "chord_pressure": "chord, pressure side",
     "no_cycles_were_found": "no cycles were found",
     "no_draw_wire_real_or_virtual_is_in": "no draw wire, real or virtual, is in the tables",
     "no_health_was_written": "no health was written",

@@ -94,6 +94,8 @@ class States:
         What was decided on the way, for run.json.
     warnings
         Sentences for the user.
+    outline
+        Columns of the table of this name, without ``t_s``; empty under a method that has none.
     checks
         What the run asked of itself.
     budget
@@ -123,6 +125,7 @@ class States:
     evidence: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
     failed: Sequence[str] = ()
+    outline: Mapping[str, Any] = field(default_factory=dict)
     checks: Sequence[Check] = ()
     budget: Sequence[Mapping[str, Any]] = ()
 

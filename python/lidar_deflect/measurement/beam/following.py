@@ -163,5 +163,5 @@ def _count(
 
 
 def _joined(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "xyz_m")
+    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "chord", "xyz_m")
     return {name: np.concatenate([part[name] for part in parts]) for name in names}

@@ -15,6 +15,7 @@ pub mod gather;
 pub mod layout;
 pub mod mesh;
 pub mod normal;
+pub mod outline;
 pub mod posed;
 pub mod rig;
 pub mod rows;

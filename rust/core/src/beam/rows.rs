@@ -64,6 +64,8 @@ pub struct Used {
     pub residual_m: f64,
     /// Measured point, world, metres.
     pub point: Vector3<f64>,
+    /// Chord fraction at which its ray meets the model; below 0 on the pressure side.
+    pub chord: f64,
 }
 
 impl Weights {
@@ -171,6 +173,7 @@ impl<'a> Rows<'a> {
             s_m: self.arc_m(&hit.contact),
             residual_m: residual,
             point: lidar.origin + direction * (hit.range_m + residual),
+            chord: self.chord(&hit.contact),
         };
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
             self.tally.rejected.push(met);
@@ -196,6 +199,15 @@ impl<'a> Rows<'a> {
             let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
             blade.hit(mesh, &lidar.origin, direction, s_m)
         })
+    }
+
+    fn chord(&self, contact: &Contact) -> f64 {
+        let is_pressure = contact.vertex >= self.adjustment.problem.mesh.outline[0].len() / 2;
+        if is_pressure {
+            -contact.x_c
+        } else {
+            contact.x_c
+        }
     }
 
     fn arc_m(&self, contact: &Contact) -> f64 {
@@ -259,7 +271,10 @@ impl<'a> Rows<'a> {
             .shape
             .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
-        row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
+        if self.adjustment.free.end > layout.len() {
+            // A strain is fitted as a check: everything moves away from the root.
+            row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
+        }
         row
     }
 

@@ -20,9 +20,9 @@ pub struct Sections {
 
 /// One section of one state.
 pub(super) struct Place {
-    contact: Contact,
+    pub(super) contact: Contact,
     chord: Vector3<f64>,
-    point: Vector3<f64>,
+    pub(super) point: Vector3<f64>,
     sway: Vec<(usize, f64)>,
 }
 
@@ -155,7 +155,12 @@ impl Adjustment {
     }
 
     /// What the surface unknowns add to the point of the drawing, and the sway where it is not in it.
-    fn correction(&self, of: (&Posed, usize), place: &Place, has_sway: bool) -> Vector3<f64> {
+    pub(super) fn correction(
+        &self,
+        of: (&Posed, usize),
+        place: &Place,
+        has_sway: bool,
+    ) -> Vector3<f64> {
         let mut rows = DMatrix::zeros(self.layout.len(), 3);
         for axis in 0..3 {
             let along = Vector3::ith(axis, 1.0);
@@ -172,7 +177,7 @@ impl Adjustment {
     }
 
     /// Adds to a column how all unknowns move a place along `along` and turn it about `turn`.
-    fn fill(
+    pub(super) fn fill(
         &self,
         rows: &mut DMatrix<f64>,
         column: usize,

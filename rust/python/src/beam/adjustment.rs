@@ -333,6 +333,20 @@ impl BeamAdjustment {
         ))
     }
 
+    /// Outlines of the sections in every hold, (holds * sections * points, 4): x, y, z in metres and
+    /// the standard deviation along the normal.
+    fn outlines<'py>(
+        &self,
+        py: Python<'py>,
+        s_m: Vec<f64>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.outlines(&s_m, &gates))??;
+        Ok(arrays::rows(py, found)?)
+    }
+
     /// Where groups of unknowns start.
     fn layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let layout = &self.core.layout;
@@ -368,6 +382,7 @@ fn met<'py>(py: Python<'py>, echoes: &[Used]) -> PyResult<Bound<'py, PyDict>> {
         "residual_m",
         column(py, echoes.iter().map(|e| e.residual_m)),
     )?;
+    told.set_item("chord", column(py, echoes.iter().map(|e| e.chord)))?;
     let points: Vec<[f64; 3]> = echoes.iter().map(|e| e.point.into()).collect();
     told.set_item("xyz_m", arrays::rows(py, points)?)?;
     Ok(told)
