@@ -16,12 +16,17 @@ if TYPE_CHECKING:
 
 ONE = 2.0
 """Largest pull of a single unknown that is no warning."""
+CONTRADICTS = 8.0
+"""No luck explains a pull beyond this: it is no warning any more."""
 TOLD = 0.95
 """An unknown whose deviation the data left above this share of what it was tells nothing."""
 
 
 def pulls(names: Sequence[str], values: NDArray[np.float64]) -> Iterator[Check]:
-    """Give the largest pull of each group of unknowns; one beyond its limit is a warning.
+    """Give the largest pull of each group of unknowns.
+
+    One beyond its limit is a warning,
+    one beyond 8 a contradiction.
 
     Parameters
     ----------
@@ -42,7 +47,7 @@ def pulls(names: Sequence[str], values: NDArray[np.float64]) -> Iterator[Check]:
                 f"{worst:+.1f}",
                 f"{limit:.1f} of {own.size}",
                 abs(worst) <= limit,
-                only_warns=True,
+                only_warns=abs(worst) <= CONTRADICTS,
             )
 
 
