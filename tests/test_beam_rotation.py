@@ -40,3 +40,18 @@ def test_between_holds_it_lies_between_them() -> None:
     variance[1] = 4e-6
     u = rotation.over_time(variance, np.array([0.0, 1.0]), np.array([0.0, 0.25, 1.0]))
     assert u[:, 0, 0] == pytest.approx([0.0, 1e-3, 2e-3])
+
+
+def test_a_swung_blade_keeps_nothing_in_common_with_its_rest_beyond_a_metre() -> None:
+    from lidar_deflect.measurement.beam.swung import widened
+    from lidar_deflect.measurement.beam.uncertainty import Uncertainty
+
+    joint = np.zeros((1, 1, 4, 1, 1, 4))
+    for axis, sigma in enumerate((0.003, 0.004, 0.001)):
+        joint[0, 0, axis, 0, 0, axis] = sigma**2
+    moved = np.array([[[0.0, 0.0, 0.0]], [[2.0, 0.0, 0.0]]])
+    bare = Uncertainty(*(np.zeros((2, 1, 3)),) * 2, *(np.zeros((2, 1)),) * 2)
+    found = widened(bare, HoldCovariance(np.zeros((1, 1, 4)), joint), moved)
+    assert found.deflection_m[0] == pytest.approx(0.0)
+    assert found.deflection_m[1, 0] == pytest.approx(np.sqrt(2.0) * np.array([0.003, 0.004, 0.001]))
+    assert found.total_m[1, 0] == pytest.approx(np.sqrt(2.0) * 0.003)

@@ -19,6 +19,7 @@ from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
 from lidar_deflect.measurement.beam.outline import outline_of
+from lidar_deflect.measurement.beam.swung import widened
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
 from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States, joined_names
 
@@ -63,6 +64,8 @@ def measure(inputs: Inputs) -> States:
     reference, spread = _reference(inputs, s_m, followed, times_ns, covariance)
     moved = followed.values[..., :3] - reference
     uncertainty = over_time(covariance, spread, solved, expected, followed, times_ns, moved)
+    if expected.swings:
+        uncertainty = widened(uncertainty, covariance, moved)
     of = slice(0, len(sections))
     status, reason = _grades(followed)
     asked = checks(inputs, solved, s_m, covariance)

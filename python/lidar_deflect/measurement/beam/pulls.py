@@ -25,8 +25,7 @@ TOLD = 0.95
 def pulls(names: Sequence[str], values: NDArray[np.float64]) -> Iterator[Check]:
     """Give the largest pull of each group of unknowns.
 
-    One beyond its limit is a warning,
-    one beyond 8 a contradiction.
+    One beyond its limit is a warning, one beyond `CONTRADICTS` a contradiction.
 
     Parameters
     ----------
