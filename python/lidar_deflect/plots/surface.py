@@ -122,15 +122,17 @@ def residual_map(result: HasTables) -> go.Figure:
     width = max((high - low) / _SPAN_CELLS, 0.25)
     for row, is_suction in ((1, True), (2, False)):
         part = points.filter((pl.col("chord") >= 0.0) == is_suction)
-        figure.add_trace(_cells(part, low, width, first=row == 1), row=row, col=1)
+        figure.add_trace(_cells(part, low, width), row=row, col=1)
     figure.update_yaxes(title_text=words.PLOT["chord_suction"], range=[0, 1], row=1, col=1)
     figure.update_yaxes(title_text=words.PLOT["chord_pressure"], range=[1, 0], row=2, col=1)
     figure.update_xaxes(title_text=words.PLOT["arc_length_s"], row=2, col=1)
-    figure.update_layout(height=460)
+    bar = {"title": {"text": "mm"}, "len": 0.9}
+    ends = {"cmin": -_WORST_MM, "cmax": _WORST_MM}
+    figure.update_layout(height=460, coloraxis={"colorscale": "RdBu", "colorbar": bar, **ends})
     return figure
 
 
-def _cells(part: pl.DataFrame, low: float, width: float, *, first: bool) -> go.Heatmap:
+def _cells(part: pl.DataFrame, low: float, width: float) -> go.Heatmap:
     counted = (
         part.with_columns(
             s=((pl.col("s_m") - low) / width).floor().cast(pl.Int64),
@@ -146,10 +148,6 @@ def _cells(part: pl.DataFrame, low: float, width: float, *, first: bool) -> go.H
         y=(counted["c"] + 0.5) / _CHORD_CELLS,
         z=1e3 * counted["residual_m"],
         customdata=counted["count"],
-        zmin=-_WORST_MM,
-        zmax=_WORST_MM,
-        colorscale="RdBu",
-        showscale=first,
-        colorbar={"title": {"text": "mm"}, "len": 0.9},
+        coloraxis="coloraxis",
         hovertemplate="%{x:.1f} m, chord %{y:.2f}<br>%{z:.1f} mm of %{customdata}<extra></extra>",
     )
