@@ -187,9 +187,13 @@ def _terms(
     entry = _nearest(result, section, entries, row)
     squares = {name: _square(of, row) for name, of in entry["terms"].items()}
     whole = sum(squares.values())
-    if row["ud_m"] is not None and row["ud_m"] ** 2 > whole * (1.0 + 1e-6):
-        squares["moment"] = row["ud_m"] ** 2 - whole
-        whole = row["ud_m"] ** 2
+    beyond = (row["ud_m"] or 0.0) ** 2 - whole
+    if beyond > whole * 1e-6:
+        # The budget of the unloaded hold is of its position: a swing counts from it once more.
+        again = 0.0 if _has_moved(entry) else min(beyond, whole)
+        squares |= {"reference": again} if again else {}
+        squares["moment"] = beyond - again
+        whole += beyond
     terms = [
         Term(
             name, words.BUDGET_TERMS.get(name, name), square**0.5, square / whole if whole else 0.0
@@ -197,6 +201,10 @@ def _terms(
         for name, square in squares.items()
     ]
     return entry["step"], tuple(sorted(terms, key=lambda term: -term.u_m))
+
+
+def _has_moved(entry: Mapping[str, Any]) -> bool:
+    return any(of[name] for of in entry["terms"].values() for name in VALUES)
 
 
 def _square(of: Mapping[str, float], row: Mapping[str, Any]) -> float:

@@ -439,7 +439,7 @@ BUDGET_TERMS = {
     "loads": "where and how the load enters",
     "root": "rotation of the root",
     "sway": "sway within the hold",
-    "reference": "unloaded state kept by the calibration",
+    "reference": "the unloaded state that the deflection counts from",
     "moment": "noise of this moment alone",
 }
 BUDGET_STEP_CAPTION = (
