@@ -164,7 +164,8 @@ def poses() -> pl.DataFrame:
         for axis in "xyz":
             columns |= {f"r{axis}_mrad": 0.02 * k * at_s / 60.0, f"ur{axis}_mrad": None}
             columns |= {f"t{axis}_mm": 0.3 * k * at_s / 60.0, f"ut{axis}_mm": None}
-        parts.append(tables.build("poses", columns | {"moved": [False] * at_s.size}))
+        columns |= {"moved": [False] * at_s.size, "followed": [False] * at_s.size}
+        parts.append(tables.build("poses", columns))
     return pl.concat(parts)
 
 
