@@ -25,6 +25,10 @@ const SWAY_M: [f64; 4] = [0.05, 0.05, 0.015, 0.015];
 const KNOT_NS: i64 = 200_000_000;
 /// Largest step of an unknown, standard deviations: farther away the neighbours are not linear.
 const LARGEST_STEP: f64 = 3.0;
+/// A step that takes back so much of the last one is halved: the truth lies between both.
+const TURNED_BACK: f64 = 0.5;
+/// The same of the surface, whose unknowns are many and each of little effect.
+const LARGEST_WAVE: f64 = 6.0;
 /// Standard deviation of how far edges lie outside of the silhouette, rad.
 pub const EDGE_RAD: f64 = 1e-3;
 /// The same of one hold, lidar and side against all, rad.
@@ -124,6 +128,9 @@ pub struct Adjustment {
     pub(super) shared: Vec<Unknown>,
     pub(super) own: Vec<Vec<Unknown>>,
     linear: Vec<Linear>,
+    /// The blade before the surface's unknowns; `problem.mesh` is what they make of it.
+    drawn: Mesh,
+    last_step: DVector<f64>,
 }
 
 /// What one iteration did.
@@ -155,6 +162,7 @@ impl Adjustment {
         };
         let mut adjustment = Self {
             values: DVector::zeros(layout.len()),
+            last_step: DVector::zeros(layout.len()),
             expected: DVector::zeros(layout.len()),
             tightness: DVector::repeat(layout.len(), 1.0),
             free: 0..layout.len(),
@@ -167,6 +175,7 @@ impl Adjustment {
             shared,
             own,
             linear: Vec::new(),
+            drawn: problem.mesh.clone(),
             problem,
         };
         adjustment.linearise()?;
@@ -261,6 +270,7 @@ impl Adjustment {
     pub(super) fn like(&self, problem: Problem, layout: Layout) -> Self {
         Self {
             values: zeros(layout.len()),
+            last_step: zeros(layout.len()),
             expected: zeros(layout.len()),
             tightness: DVector::repeat(layout.len(), 1.0),
             linear: Vec::new(),
@@ -277,7 +287,14 @@ impl Adjustment {
             self.rig.values[unknown - rig] += change;
         } else {
             self.values[unknown] += change;
+            self.build();
         }
+    }
+
+    /// Brings the surface to its unknowns.
+    fn build(&mut self) {
+        let values = self.values.rows(self.layout.shape_at(), self.layout.shape);
+        self.problem.mesh = self.problem.shape.built(&self.drawn, values.as_slice());
     }
 
     /// Shared and own unknowns of a hold.
@@ -341,12 +358,21 @@ impl Adjustment {
             .copy_from(&part);
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
         let largest = step.rows(0, self.layout.sway_at(0)).amax();
-        if largest > LARGEST_STEP {
-            step *= LARGEST_STEP / largest;
+        let swollen = step.rows(self.layout.shape_at(), self.layout.shape).amax();
+        let excess = (largest / LARGEST_STEP).max(swollen / LARGEST_WAVE);
+        if excess > 1.0 {
+            step /= excess;
         }
+        if step.dot(&self.last_step) < -TURNED_BACK * self.last_step.norm_squared() {
+            step *= 0.5;
+        }
+        self.last_step.copy_from(&step);
         self.values += &step;
         self.rig.values += step.rows(rig, count);
         self.values.rows_mut(rig, count).fill(0.0);
+        if self.free.contains(&self.layout.shape_at()) {
+            self.build();
+        }
         if gates.stage == Stage::All {
             self.weights.learn(&tallies);
         }
