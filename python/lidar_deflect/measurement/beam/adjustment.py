@@ -49,13 +49,14 @@ LOADS = _stage("loads", (3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
 BLADE = _stage("blade", *[(1.0, 1.0)] * 2, *[(0.6, 0.6)] * 2, *[(0.3, 0.4)] * 2, (0.2, 0.2))
 DRAWN = (*LOADS, *BLADE, *_stage("all", (0.1, 0.1), *[LAST] * 3))
 """Gates of echoes along and of edges across the ray, metres, and what may change, step by step."""
-FAR = _stage("loads", (6.0, 5.0), (6.0, 5.0), (4.0, 3.0))
-SURFACE = _stage("all", *[(0.4, 0.4)] * 4, *[(0.2, 0.2)] * 3, *[(0.1, 0.1)] * 2, *[LAST] * 3)
+FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
+SURFACE = _stage("all", *[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8)
 UNDRAWN = (*FAR, *LOADS, *SURFACE)
 """The same where no drawing tells the prebend and the surface: what bends it would bend to fit it."""
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
 MAX_LAST = 12
+MAX_LAST_UNDRAWN = 40
 
 NOISE_M, SURFACE_M, EDGE_RAD = 0.015, 0.002, 1e-4
 
@@ -198,7 +199,7 @@ def _settle(
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
     schedule = UNDRAWN if is_far else DRAWN
     listener = inputs.listener("adjust")
-    total = len(schedule) + MAX_LAST
+    total = len(schedule) + (MAX_LAST_UNDRAWN if is_far else MAX_LAST)
     told: Mapping[str, Any] = {"largest": np.inf}
     steps = 0
     while steps < len(schedule) or (told["largest"] > SETTLED and steps < total):

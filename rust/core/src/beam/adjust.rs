@@ -25,6 +25,10 @@ const SWAY_M: [f64; 4] = [0.05, 0.05, 0.015, 0.015];
 const KNOT_NS: i64 = 200_000_000;
 /// Largest step of an unknown, standard deviations: farther away the neighbours are not linear.
 const LARGEST_STEP: f64 = 3.0;
+/// The same where deviations are those of blades in general.
+const LARGEST_VAGUE_STEP: f64 = 0.3;
+/// Gate at which steps are held back as a prior would, metres.
+const FREE_GATE_M: f64 = 0.025;
 /// A step that takes back so much of the last one is halved: the truth lies between both.
 const TURNED_BACK: f64 = 0.5;
 /// The same of the surface, whose unknowns are many and each of little effect.
@@ -351,7 +355,8 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
-        let (normal, tallies) = self.normal(gates);
+        let (mut normal, tallies) = self.normal(gates);
+        self.damp(&mut normal, gates);
         let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
         let mut step = DVector::zeros(self.layout.len());
         step.rows_mut(self.free.start, self.free.len())
@@ -359,7 +364,7 @@ impl Adjustment {
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
         let largest = step.rows(0, self.layout.sway_at(0)).amax();
         let swollen = step.rows(self.layout.shape_at(), self.layout.shape).amax();
-        let excess = (largest / LARGEST_STEP).max(swollen / LARGEST_WAVE);
+        let excess = (largest / self.largest_step(gates.stage)).max(swollen / LARGEST_WAVE);
         if excess > 1.0 {
             step /= excess;
         }
@@ -397,6 +402,34 @@ impl Adjustment {
         (sum, tallies)
     }
 
+    /// Holds back, while gates are wide, what a blade without a drawing could do far from where it is.
+    fn damp(&self, normal: &mut Normal, gates: &Gates) {
+        if !self.is_vague() || gates.stage != Stage::All {
+            return;
+        }
+        let rig = self.layout.lidar_at(0)..self.layout.shape_at();
+        let damping = (gates.echo_m / FREE_GATE_M).powi(2);
+        for (place, unknown) in self.free.clone().enumerate() {
+            if !rig.contains(&unknown) {
+                normal.matrix[(place, place)] += damping;
+            }
+        }
+    }
+
+    /// How far an unknown of the blade may go in one step, standard deviations.
+    fn largest_step(&self, stage: Stage) -> f64 {
+        if self.is_vague() && stage == Stage::All {
+            LARGEST_VAGUE_STEP
+        } else {
+            LARGEST_STEP
+        }
+    }
+
+    /// Whether no drawing tells how the blade is bent without load.
+    fn is_vague(&self) -> bool {
+        self.problem.trust.free_rad_m > VAGUE_RAD_M
+    }
+
     /// The first stage at which an unknown may change.
     fn needs(&self, unknown: usize) -> Stage {
         if unknown >= self.layout.lidar_at(0) {
@@ -411,10 +444,9 @@ impl Adjustment {
                 .nth(unknown - self.layout.shared)
                 .map(|own| own.kind)
         };
-        let is_vague = self.problem.trust.free_rad_m > VAGUE_RAD_M;
         match kind {
             Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
-            Some(Kind::Free { mode: 0 | 1, .. }) if is_vague => Stage::Loads,
+            Some(Kind::Free { mode: 0 | 1, .. }) if self.is_vague() => Stage::Loads,
             _ => Stage::Blade,
         }
     }
