@@ -34,7 +34,9 @@ const TURNED_BACK: f64 = 0.5;
 /// The same of the surface, whose unknowns are many and each of little effect.
 const LARGEST_WAVE: f64 = 6.0;
 /// Standard deviation of how far edges lie outside of the silhouette, rad.
-pub const EDGE_RAD: f64 = 1e-3;
+pub const EDGE_RAD: f64 = 3e-4;
+/// How far they do, as beams of 1 to 3 mrad have it, rad.
+const EDGE_EXPECTED_RAD: f64 = 4e-4;
 /// The same of one hold, lidar and side against all, rad.
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
 
@@ -182,6 +184,8 @@ impl Adjustment {
             drawn: problem.mesh.clone(),
             problem,
         };
+        let edge = adjustment.layout.edge_at();
+        adjustment.expected[edge] = EDGE_EXPECTED_RAD / EDGE_RAD;
         adjustment.linearise()?;
         Ok(adjustment)
     }
