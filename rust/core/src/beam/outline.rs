@@ -56,10 +56,10 @@ impl Adjustment {
         contact.vertex = vertex;
         contact.normal = section.turn * outward;
         place.point = contact.point;
-        place.point += self.correction((posed, hold), place, true);
+        place.point += self.mean_correction((posed, hold), place);
     }
 
-    /// The point with the waves of the surface, and its slopes along the normal in a column.
+    /// The point, and its slopes along the normal in a column.
     fn surface_point(
         &self,
         rows: &mut DMatrix<f64>,
@@ -75,12 +75,10 @@ impl Adjustment {
         problem
             .shape
             .waves(mesh, &place.contact, &normal, first, &mut waves);
-        let mut stands_out_m = 0.0;
         for (unknown, slope) in waves {
             rows[(unknown, column)] += slope;
-            stands_out_m += slope * self.values[unknown];
         }
-        place.point + normal * stands_out_m
+        place.point
     }
 }
 

@@ -161,8 +161,7 @@ impl<'a> Rows<'a> {
             return arc_m;
         }
         let mut row = self.echo_row(echo, &hit);
-        let built_m = self.built(&row);
-        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - built_m;
+        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring);
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
         let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
@@ -216,27 +215,10 @@ impl<'a> Rows<'a> {
         mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
     }
 
-    /// What the surface as built adds to the prediction of the drawing, by a row's slopes.
-    fn built(&self, row: &[(usize, f64)]) -> f64 {
-        let (layout, values) = (&self.adjustment.layout, &self.adjustment.values);
-        let surface = layout.shape_at()..layout.edge_at();
-        let of_surface = row.iter().filter(|entry| surface.contains(&entry.0));
-        of_surface
-            .map(|(unknown, slope)| slope * values[*unknown])
-            .sum()
-    }
-
     fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
         let along = -hit.contact.normal / hit.cosine;
         let mut row = self.row(&hit.contact, &along, echo.lidar, echo.time_ns);
-        let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
-        problem.shape.waves(
-            &problem.mesh,
-            &hit.contact,
-            &along,
-            layout.shape_at(),
-            &mut row,
-        );
+        let layout = &self.adjustment.layout;
         let first = layout.lidar_at(echo.lidar);
         row.push((first + 7, -hit.range_m));
         if echo.ring < layout.channels[echo.lidar] {
@@ -267,9 +249,9 @@ impl<'a> Rows<'a> {
                     .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
             );
         }
-        problem
-            .shape
-            .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
+        let (mesh, first) = (&problem.mesh, layout.shape_at());
+        problem.shape.slopes(mesh, contact, along, first, &mut row);
+        problem.shape.waves(mesh, contact, along, first, &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
         if self.adjustment.free.end > layout.len() {
             // A strain is fitted as a check: everything moves away from the root.
@@ -315,8 +297,7 @@ impl<'a> Rows<'a> {
         let values = &self.adjustment.values;
         let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
         let mut row = self.edge_row(edge, plane, silhouette);
-        let built_rad = self.built(&row);
-        let residual = 0.5 * step_rad - silhouette.angle_rad - outside - built_rad;
+        let residual = 0.5 * step_rad - silhouette.angle_rad - outside;
         let coarse_rad = self.gates.coarse_m()[1] / silhouette.range_m;
         let sigma_rad = self.adjustment.weights.edge_rad.hypot(coarse_rad);
         let sigma = (step_rad / 12f64.sqrt()).hypot(sigma_rad);

@@ -137,7 +137,9 @@ impl Adjustment {
             contact,
             sway,
         };
-        place.point += self.correction((blade, hold), &place, time_ns.is_none());
+        if time_ns.is_none() {
+            place.point += self.mean_correction((blade, hold), &place);
+        }
         place
     }
 
@@ -154,26 +156,17 @@ impl Adjustment {
         weights.into_iter().enumerate().collect()
     }
 
-    /// What the surface unknowns add to the point of the drawing, and the sway where it is not in it.
-    pub(super) fn correction(
-        &self,
-        of: (&Posed, usize),
-        place: &Place,
-        has_sway: bool,
-    ) -> Vector3<f64> {
+    /// What the sway of the hold's mean adds to the place at rest.
+    pub(super) fn mean_correction(&self, of: (&Posed, usize), place: &Place) -> Vector3<f64> {
         let mut rows = DMatrix::zeros(self.layout.len(), 3);
         for axis in 0..3 {
             let along = Vector3::ith(axis, 1.0);
             self.fill(&mut rows, axis, of, place, &along, &Vector3::zeros());
         }
-        let mut values = self.values.clone();
-        let posed = if has_sway {
-            self.layout.sway_at(0)
-        } else {
-            self.layout.lidar_at(0)
-        };
-        values.rows_mut(0, posed).fill(0.0);
-        Vector3::from_iterator(rows.tr_mul(&values).iter().copied())
+        let sway = self.layout.sway_at(0)..self.layout.lidar_at(0);
+        let (of_sway, count) = (rows.rows(sway.start, sway.len()), sway.len());
+        let values = self.values.rows(sway.start, count);
+        Vector3::from_iterator(of_sway.tr_mul(&values).iter().copied())
     }
 
     /// Adds to a column how all unknowns move a place along `along` and turn it about `turn`.

@@ -52,7 +52,7 @@ impl BeamAdjustment {
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
         trust: [f64; 5],
-        shape_trust: [f64; 6],
+        shape_trust: [f64; 7],
         noise_m: f64,
         surface_m: f64,
         edge_rad: f64,
@@ -86,6 +86,7 @@ impl BeamAdjustment {
             twist_waves_rad,
             axis_fraction,
             waves_m,
+            slow_knot_m,
         ] = shape_trust;
         let shape = ShapeTrust {
             chord,
@@ -94,6 +95,7 @@ impl BeamAdjustment {
             twist_waves_rad,
             axis_fraction,
             waves_m,
+            slow_knot_m,
         };
         let problem = Problem {
             mesh: blade.mesh.clone(),
