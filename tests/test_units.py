@@ -134,3 +134,22 @@ def test_one_column_of_firing_times_is_not_half_taken_by_a_qt128(tmp_path: Path)
         capture.open(path, beams={"": [times]}).scan()
     assert caught.value.code == "beams.not_taken"
     assert [entry["file"] for entry in capture.open(path).info()["unused_files"]] == [times.name]
+
+
+def test_a_capture_named_after_another_model_is_told_by_its_content(tmp_path: Path) -> None:
+    sample = SAMPLES / "velodyne_hdl32e_gps.pcap"
+    path = Path(shutil.copy(sample, tmp_path / "velodyne_vlp32c_tower.pcap"))
+    # As many lasers as an HDL-32E has, with elevations of a VLP-32C.
+    elevations_deg = [-25.0, -1.0, -1.667, -15.639, -11.31, 0.0, -0.667, -8.843] * 4
+    lasers = "".join(
+        f"  - laser_id: {number}\n    vert_correction: {np.radians(elevation_deg)}\n"
+        for number, elevation_deg in enumerate(elevations_deg)
+    )
+    (tmp_path / "velodyne_vlp32c.calib.yml").write_text(f"num_lasers: 32\nlasers:\n{lasers}")
+    opened, plain = capture.open(path), capture.open(sample)
+    (stream,) = opened.streams
+    assert (stream.model, stream.beams) == ("hdl32e", "factory table")
+    assert [entry["file"] for entry in opened.info()["unused_files"]] == [
+        "velodyne_vlp32c.calib.yml"
+    ]
+    np.testing.assert_array_equal(points(opened), points(plain))

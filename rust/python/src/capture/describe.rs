@@ -71,7 +71,8 @@ fn stream<'py>(py: Python<'py>, info: &StreamInfo) -> Dict<'py> {
     dict.set_item("beams", beams)?;
     dict.set_item("named", info.is_named)?;
     dict.set_item("return_mode", info.return_mode)?;
-    dict.set_item("rpm", info.model.has_rotor().then_some(info.rpm))?;
+    let is_turning = info.model.has_rotor() && info.rpm > 0.0;
+    dict.set_item("rpm", is_turning.then_some(info.rpm))?;
     dict.set_item("packets", info.counts.packets)?;
     dict.set_item("lost", info.counts.lost)?;
     dict.set_item("duplicated", info.counts.duplicated)?;

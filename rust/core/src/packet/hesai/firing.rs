@@ -34,7 +34,7 @@ pub fn is_head(head: &[String]) -> bool {
         "operational state",
     ];
     let has = |word: &&str| head.iter().any(|line| line.contains(*word));
-    words.iter().any(|word| has(&word))
+    words.iter().any(has)
 }
 
 /// Reads the firing times of a model with so many channels and ways to fire.
@@ -53,8 +53,8 @@ pub fn read(file: &UnitFile, channels: usize, ways: usize) -> Result<Firing, Uni
         return Err(file.refuse(None, wanted, found));
     }
     // Channels that do not fire in a loop have no row.
-    if !is_loops(&table) && table.len() < channels {
-        let (wanted, found) = (format!("{channels} channels"), table.len().to_string());
+    if !is_loops(&table) && table.count() < channels {
+        let (wanted, found) = (format!("{channels} channels"), table.count().to_string());
         return Err(file.refuse(None, wanted, found));
     }
     let near_m = near_m(file);

@@ -47,7 +47,7 @@ impl Table {
     }
 
     /// Rows of channels.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.rows.len()
     }
 

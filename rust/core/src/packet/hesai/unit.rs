@@ -34,7 +34,7 @@ impl Unit {
         let angles = angles(&table, &file).expect("the built-in tables are sound");
         let names = table.names.iter().skip(3).cloned();
         let times = names.enumerate().map(|(place, name)| {
-            let column = table.column(&file, 0, place + 3, table.len());
+            let column = table.column(&file, 0, place + 3, table.count());
             let column = column.expect("the built-in tables are sound");
             let nanos = column
                 .into_iter()
@@ -107,7 +107,7 @@ impl Unit {
 
 /// Elevations and azimuths, radians.
 fn angles(table: &Table, file: &UnitFile) -> Result<(Vec<f64>, Vec<f64>), UnitError> {
-    let count = table.len();
+    let count = table.count();
     let whole = |column: usize| {
         let values = table.column(file, 0, column, count)?;
         let all: Option<Vec<f64>> = values.iter().map(|deg| deg.map(f64::to_radians)).collect();

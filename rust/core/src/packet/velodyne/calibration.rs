@@ -182,12 +182,20 @@ impl Item<'_> {
             distance_y_m: near("distance_y")?,
             vertical_offset_m: metres("vertical")?,
             horizontal_offset_m: metres("horizontal")?,
-            // Centimetres in both.
-            focal_distance_m: self.number(file, "focal_distance")? * 0.01,
+            focal_distance_m: self.focal_distance_m(file)?,
             focal_slope: self.number(file, "focal_slope")?,
             min_intensity: self.number(file, "min_intensity")?,
             max_intensity: self.number(file, "max_intensity")?,
         })
+    }
+
+    /// Metres in the YAML, but for files whose makers left the viewer's centimetres as they were.
+    fn focal_distance_m(&self, file: &UnitFile) -> Result<f64, UnitError> {
+        /// The lasers see no farther.
+        const MOST_M: f64 = 131.0;
+        let value = self.number(file, "focal_distance")?;
+        let is_metres = !self.is_xml && value <= MOST_M;
+        Ok(if is_metres { value } else { value * 0.01 })
     }
 
     fn number(&self, file: &UnitFile, name: &'static str) -> Result<f64, UnitError> {
@@ -327,6 +335,18 @@ mod tests {
         assert!((laser.rotation_rad - std::f64::consts::PI).abs() < 1e-12);
         assert!((laser.elevation_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         assert!((laser.distance_m - 1.4).abs() < 1e-12 && laser.min_intensity == 7.0);
+    }
+
+    #[test]
+    fn the_focus_is_in_metres_or_centimetres() {
+        let focus_m = |value: &str| {
+            let text = BLOCK.replace(
+                "vert_correction: 0.125",
+                &format!("vert_correction: 0.125\n    focal_distance: {value}"),
+            );
+            lasers(&UnitFile::new("u", text)).unwrap()[0].focal_distance_m
+        };
+        assert_eq!((focus_m("10.5"), focus_m("1050")), (10.5, 10.5));
     }
 
     #[test]
