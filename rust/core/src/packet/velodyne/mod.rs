@@ -10,6 +10,7 @@ pub mod position;
 pub mod puck;
 pub(super) mod rotation;
 mod rows;
+mod table;
 pub mod vlp32;
 pub mod vls128;
 pub mod writer;
