@@ -2,10 +2,13 @@
 //!
 //! [`design`] and [`mesh`] hold the drawing, [`equilibrium`] and [`family`] say which states it can
 //! have, [`axis`] keeps its length, [`sight`] meets it with rays and scan planes, [`adjust`] puts
-//! everything into one adjustment. Source: docs/method.md.
+//! everything into one adjustment, [`common`] says what neighbouring data share, [`track`] follows the blade between
+//! holds and [`carry`] tells how well each instant is known. Source: docs/method.md.
 
 pub mod adjust;
 pub mod axis;
+pub mod carry;
+pub mod common;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;
@@ -15,6 +18,7 @@ pub mod layout;
 pub mod mesh;
 pub mod normal;
 pub mod posed;
+mod prior;
 pub mod rig;
 pub mod rows;
 #[cfg(test)]
@@ -25,3 +29,4 @@ pub mod sight;
 pub mod start;
 mod table;
 pub mod track;
+pub mod weights;
