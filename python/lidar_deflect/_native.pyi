@@ -443,8 +443,8 @@ class BeamAdjustment:
         self, s_m: Sequence[float], echo_m: float, edge_m: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
     def states(
-        self, hold: int, s_m: Sequence[float], times_ns: Sequence[int]
-    ) -> NDArray[np.float64]: ...
+        self, hold: int, times_ns: Sequence[int], each: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
     @staticmethod
     def load_knots(span_ns: tuple[int, int]) -> list[int]: ...
     def follow(
@@ -453,7 +453,6 @@ class BeamAdjustment:
         spans_ns: Sequence[tuple[int, int]],
         loads: Sequence[Sequence[float]],
         times_ns: Sequence[Sequence[int]],
-        s_m: Sequence[float],
         hold_loads: Sequence[float],
         gates: Sequence[tuple[float, float]],
         sway_m: Sequence[float],
@@ -469,6 +468,7 @@ class BeamAdjustment:
     def strains(
         self, echo_m: float, edge_m: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def loose_edges(self) -> list[tuple[int, int, int, float]]: ...
     def layout(self) -> dict[str, int]: ...
 
 @final

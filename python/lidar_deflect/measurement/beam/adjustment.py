@@ -52,7 +52,7 @@ DRAWN = (*LOADS, *BLADE, *_stage("all", (0.1, 0.1), *[LAST] * 3))
 FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
 SURFACE = _stage("all", *[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8)
 UNDRAWN = (*FAR, *LOADS, *SURFACE)
-"""The same where no drawing tells the prebend and the surface: what bends it would bend to fit it."""
+"""The same where no drawing tells the prebend and the surface: what bends would bend to fit it."""
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
 MAX_LAST = 12
@@ -200,7 +200,7 @@ def _settle(
     schedule = UNDRAWN if is_far else DRAWN
     listener = inputs.listener("adjust")
     total = len(schedule) + (MAX_LAST_UNDRAWN if is_far else MAX_LAST)
-    told: Mapping[str, Any] = {"largest": np.inf}
+    told: dict[str, Any] = {"largest": np.inf}
     steps = 0
     while steps < len(schedule) or (told["largest"] > SETTLED and steps < total):
         told = native.step(*(schedule[steps] if steps < len(schedule) else (*LAST, "all")))

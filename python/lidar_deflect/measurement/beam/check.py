@@ -210,6 +210,18 @@ def _turn(
         )
 
 
+def loose_edges(inputs: Inputs, solved: Solved) -> list[str]:
+    """Say where echoes end far from the silhouette, so that these edges do not count."""
+    lidars = [inputs.lidars[place] for place in inputs.stands]
+    sides = ("leading", "trailing")
+    return [
+        f"hold {solved.holds[hold].label}, lidar {lidars[lidar]}: echoes end "
+        f"{1e3 * abs(off):.1f} mrad {'outside' if off > 0 else 'inside'} of the {sides[side]} edge "
+        "and do not count"
+        for hold, lidar, side, off in solved.native.loose_edges()
+    ]
+
+
 def objects(solved: Solved) -> Mapping[str, Any]:
     """Columns of the table `rejected`: echoes near the blade that do not fit it, by place."""
     rows: list[tuple[int, int, float, Any]] = []

@@ -29,7 +29,7 @@ def widened(uncertainty: Uncertainty, covariance: HoldCovariance, moved_m: Float
     moved_m
         Deflection, shape (t, s, 3).
     """
-    own = covariance.position_covariance()[0]
+    own = np.einsum("sisj->sij", covariance.covariance[0, :, :3, 0, :, :3])
     size = np.linalg.norm(np.nan_to_num(moved_m), axis=2)
     apart = 2.0 * np.minimum(size / SHARED_M, 1.0)
     unit = np.nan_to_num(moved_m) / np.maximum(size, 1e-9)[..., None]

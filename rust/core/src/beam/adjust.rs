@@ -14,9 +14,10 @@ use super::mesh::Mesh;
 use super::normal::Normal;
 use super::posed::{Posed, knots};
 use super::rig::{Lidar, Rig};
-use super::rows::{Rows, Tally, Weights};
+use super::rows::Rows;
 use super::shape::Shape;
 use super::track::zeros;
+use super::weights::{Tally, Weights};
 use crate::error::BeamError;
 
 /// Standard deviations of the sway in its first mode in x and y and in its second, metres at the tip.
@@ -39,14 +40,12 @@ pub const EDGE_RAD: f64 = 3e-4;
 const EDGE_EXPECTED_RAD: f64 = 4e-4;
 /// The same of one hold, lidar and side against all, rad.
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
+/// Standard deviations of the range errors of a lidar on the blade: what blade and yard differ by, for
+/// they are not equally bright, and what grows with 1 / cos(incidence) - 1; metres.
+pub const RANGE_M: [f64; 2] = [0.001, 0.001];
 
-/// A stress-free curvature known no better than this has to be found with the loads, rad/m.
-const VAGUE_RAD_M: f64 = 1e-4;
 /// Data are taken for no better than this share of the gate while the gate is wide.
 const COARSE: f64 = 0.1;
-
-/// Inverse variance of what is held, against 1 of what is free.
-const HELD: f64 = 1e6;
 
 /// A hold as it enters the adjustment.
 #[derive(Debug, Clone)]
@@ -131,6 +130,8 @@ pub struct Adjustment {
     pub(super) knot_ns: i64,
     /// Whether the first mode in time is the load.
     pub(super) follows_load: bool,
+    /// Lidars and sides whose edges do not count.
+    pub(super) muted: Vec<(usize, usize)>,
     pub(super) shared: Vec<Unknown>,
     pub(super) own: Vec<Vec<Unknown>>,
     linear: Vec<Linear>,
@@ -175,6 +176,7 @@ impl Adjustment {
             modes_m: SWAY_M.to_vec(),
             knot_ns: KNOT_NS,
             follows_load: false,
+            muted: Vec::new(),
             layout,
             rig,
             weights,
@@ -282,9 +284,21 @@ impl Adjustment {
             expected: zeros(layout.len()),
             tightness: DVector::repeat(layout.len(), 1.0),
             linear: Vec::new(),
+            weights: Weights {
+                noise_m: self.weights.noise_m.clone(),
+                common: Vec::new(),
+                ..self.weights
+            },
             problem,
             layout,
-            ..self.clone()
+            rig: self.rig.clone(),
+            free: self.free.clone(),
+            modes_m: self.modes_m.clone(),
+            muted: self.muted.clone(),
+            shared: self.shared.clone(),
+            own: self.own.clone(),
+            drawn: self.drawn.clone(),
+            ..*self
         }
     }
 
@@ -427,56 +441,6 @@ impl Adjustment {
         } else {
             LARGEST_STEP
         }
-    }
-
-    /// Whether no drawing tells how the blade is bent without load.
-    fn is_vague(&self) -> bool {
-        self.problem.trust.free_rad_m > VAGUE_RAD_M
-    }
-
-    /// The first stage at which an unknown may change.
-    fn needs(&self, unknown: usize) -> Stage {
-        if unknown >= self.layout.lidar_at(0) {
-            return Stage::All;
-        }
-        let kind = if unknown < self.layout.shared {
-            Some(self.shared[unknown].kind)
-        } else {
-            self.own
-                .iter()
-                .flatten()
-                .nth(unknown - self.layout.shared)
-                .map(|own| own.kind)
-        };
-        match kind {
-            Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
-            Some(Kind::Free { mode: 0 | 1, .. }) if self.is_vague() => Stage::Loads,
-            _ => Stage::Blade,
-        }
-    }
-
-    /// What is known before the data.
-    pub(super) fn prior(&self, stage: Stage) -> Normal {
-        let mut prior = Normal::new(self.free.clone());
-        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
-        for (place, i) in self.free.clone().enumerate() {
-            let is_held = self.needs(i) > stage;
-            let tight = if is_held { HELD } else { self.tightness[i] };
-            prior.matrix[(place, place)] = tight;
-            prior.right[place] = tight * (self.expected[i] - self.values[i]);
-        }
-        if self.free.contains(&rig) {
-            let at = rig - self.free.start;
-            let hold = if stage == Stage::All { 1.0 } else { HELD };
-            let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
-            let information = &self.rig.information * hold;
-            prior
-                .matrix
-                .view_mut((at, at), (count, count))
-                .copy_from(&information);
-            prior.right.rows_mut(at, count).copy_from(&(pull * hold));
-        }
-        prior
     }
 }
 

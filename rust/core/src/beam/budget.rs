@@ -64,7 +64,7 @@ impl Adjustment {
             let step = of_edges.column(column).sum();
             groups[1][column] = step;
             groups[0][column] = total - step;
-            for (group, unknowns) in self.groups() {
+            for (group, unknowns) in self.sources() {
                 let part: f64 = unknowns
                     .map(|i| of_prior[(i, column)] * solved[(i, column)])
                     .sum();
@@ -88,7 +88,7 @@ impl Adjustment {
         let after = factor.inverse();
         let mut known = vec![("", [0.0; 3]); self.layout.len()];
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
-        for (group, unknowns) in self.groups() {
+        for (group, unknowns) in self.sources() {
             for i in unknowns {
                 let change = if (rig..rig + count).contains(&i) {
                     self.rig.values[i - rig] - self.rig.prior[i - rig]
@@ -128,7 +128,7 @@ impl Adjustment {
 
     /// Slopes of all values of all sections by all unknowns.
     fn value_rows(&self, s_m: &[f64]) -> DMatrix<f64> {
-        let (values, rows) = self.section_rows(s_m);
+        let (values, rows) = self.section_rows(&self.rests(s_m));
         let mut wanted = DMatrix::zeros(rows.nrows(), VALUES * values.len());
         for (place, value) in values.iter().enumerate() {
             let rest = place % s_m.len();
@@ -162,7 +162,7 @@ impl Adjustment {
     }
 
     /// Every unknown by number of its group.
-    fn groups(&self) -> Vec<(usize, Range<usize>)> {
+    fn sources(&self) -> Vec<(usize, Range<usize>)> {
         let layout = &self.layout;
         let mut groups = Vec::new();
         let own = self.own.iter().flatten();
@@ -176,7 +176,8 @@ impl Adjustment {
             groups.push((3, first + 6..first + RIG + channels));
         }
         groups.push((5, layout.shape_at()..layout.edge_at()));
-        groups.push((4, layout.edge_at()..layout.len()));
+        groups.push((4, layout.edge_at()..layout.range_at(0)));
+        groups.push((3, layout.range_at(0)..layout.len()));
         groups
     }
 }
@@ -223,7 +224,7 @@ mod tests {
     fn the_parts_of_a_budget_sum_to_the_variance() {
         let adjustment = sample::adjustment(0.0);
         let s_m = [40.0, 55.0];
-        let whole = adjustment.sections(&s_m, &LAST).unwrap().covariance;
+        let whole = adjustment.knowledge(&s_m, &LAST).unwrap().0.covariance;
         let budget = adjustment.budget(&s_m, &LAST).unwrap();
         for (section, column) in [(0, 0), (0, 2), (1, 1)] {
             let place = VALUES * section + column;

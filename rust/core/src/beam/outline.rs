@@ -111,7 +111,7 @@ mod tests {
         let (s_m, count) = (50.0, adjustment.problem.mesh.outline[0].len());
         let points = adjustment.outlines(&[s_m], &gates).unwrap();
         assert_eq!(points.len(), count);
-        let middle = adjustment.sections(&[s_m], &gates).unwrap().values[0];
+        let middle = adjustment.knowledge(&[s_m], &gates).unwrap().0.values[0];
         let off = |p: &[f64; 4]| Vector3::new(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]);
         // The sample's chord at 50 m is 4 - 3.4 * 50 / 60 = 1.17 m: half of it on both sides.
         let far = points.iter().map(|p| off(p).norm()).fold(0.0, f64::max);

@@ -2,11 +2,10 @@
 
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::Adjustment;
 use super::mesh::Mesh;
 use super::posed::Posed;
 use super::sight::{Contact, Section};
-use crate::error::BeamError;
 
 /// Sections of all holds with one covariance.
 #[derive(Debug, Clone)]
@@ -18,7 +17,17 @@ pub struct Sections {
     pub covariance: DMatrix<f64>,
 }
 
+/// Sections in the first hold.
+#[derive(Debug, Clone)]
+pub struct Rests {
+    /// Arc lengths, metres.
+    pub s_m: Vec<f64>,
+    pub(super) posed: Posed,
+    pub(super) places: Vec<Place>,
+}
+
 /// One section of one state.
+#[derive(Debug, Clone)]
 pub(super) struct Place {
     pub(super) contact: Contact,
     chord: Vector3<f64>,
@@ -27,43 +36,55 @@ pub(super) struct Place {
 }
 
 impl Adjustment {
-    /// The sections at `s_m` of all holds.
-    ///
-    /// # Errors
-    /// [`BeamError::Singular`].
-    pub fn sections(&self, s_m: &[f64], gates: &Gates) -> Result<Sections, BeamError> {
-        let (values, rows) = self.section_rows(s_m);
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let covariance = rows.tr_mul(&factor.solve(&rows));
-        Ok(Sections { values, covariance })
-    }
-
-    /// Values of the sections of all holds and, in four columns each, their slopes by all unknowns.
-    pub(super) fn section_rows(&self, s_m: &[f64]) -> (Vec<[f64; 4]>, DMatrix<f64>) {
-        let posed: Vec<Posed> = (0..self.problem.holds.len())
-            .map(|hold| self.posed(hold))
-            .collect();
-        let count = posed.len() * s_m.len();
+    /// The sections at `s_m` of all holds, and how all unknowns move them: columns in the order of the
+    /// values.
+    pub(super) fn section_rows(&self, rests: &Rests) -> (Vec<[f64; 4]>, DMatrix<f64>) {
+        let holds = self.problem.holds.len();
+        let count = holds * rests.s_m.len();
         let mut values = Vec::with_capacity(count);
         let mut rows = DMatrix::zeros(self.layout.len(), 4 * count);
-        for (hold, blade) in posed.iter().enumerate() {
-            for (i, s) in s_m.iter().enumerate() {
-                let first = 4 * (hold * s_m.len() + i);
-                let at = self.place_at(blade, hold, *s, None);
-                let rest = self.place_at(&posed[0], 0, *s, None);
-                values.push(self.fill_state(&mut rows, first, blade, hold, &at, &rest));
-                let (_, slopes) = twist(&self.problem.mesh, &rest, &at);
-                self.fill(
-                    &mut rows,
-                    first + 3,
-                    (&posed[0], 0),
-                    &rest,
-                    &Vector3::zeros(),
-                    &slopes[0],
-                );
+        for hold in 0..holds {
+            let posed = self.posed(hold);
+            for (s_m, rest) in rests.s_m.iter().zip(&rests.places) {
+                let (at, first) = (self.place_at(&posed, hold, *s_m, None), 4 * values.len());
+                values.push(self.fill_state(&mut rows, first, &posed, hold, &at, rest));
+                self.fill_rest(&mut rows, first + 3, &rests.posed, rest, &at);
             }
         }
         (values, rows)
+    }
+
+    /// The sections at `s_m` in the first hold.
+    pub(super) fn rests(&self, s_m: &[f64]) -> Rests {
+        let posed = self.posed(0);
+        Rests {
+            s_m: s_m.to_vec(),
+            places: s_m
+                .iter()
+                .map(|s| self.place_at(&posed, 0, *s, None))
+                .collect(),
+            posed,
+        }
+    }
+
+    /// How the first hold's unknowns move the twist of a section since then.
+    pub(super) fn fill_rest(
+        &self,
+        rows: &mut DMatrix<f64>,
+        column: usize,
+        posed: &Posed,
+        rest: &Place,
+        at: &Place,
+    ) {
+        let (_, slopes) = twist(&self.problem.mesh, rest, at);
+        self.fill(
+            rows,
+            column,
+            (posed, 0),
+            rest,
+            &Vector3::zeros(),
+            &slopes[0],
+        );
     }
 
     /// Position and twist of a section of a hold, with their slopes in four columns from `first`.
