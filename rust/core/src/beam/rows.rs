@@ -134,6 +134,7 @@ impl<'a> Rows<'a> {
         for edge in &seen.edges {
             self.add_edge(edge);
         }
+        self.normal.flush();
         (self.normal, self.tally)
     }
 
