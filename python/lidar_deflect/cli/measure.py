@@ -98,7 +98,8 @@ def measure(
     }
     talk.result(document, comparison.table1(result.steps))
     talk.note(f"written: {out}")
-    talk.timings(timings, {**result.run["timings_s"], "total": perf_counter() - begun})
+    seconds = {**result.run["timings_s"], "total": perf_counter() - begun}
+    talk.timings(timings, seconds, result.run)
     return code
 
 
