@@ -98,7 +98,7 @@ def _amounts(run: Mapping[str, Any]) -> list[tuple[str, float]]:
     if "inputs" not in run:
         return []
     megabytes = sum(file["bytes"] for file in run["inputs"]) / 1e6
-    points = sum(lidar["points"] for lidar in run["capture"]["lidars"]) / 1e6
+    points = sum(lidar["points"] for lidar in run["capture"]["streams"]) / 1e6
     return [("MB/s", megabytes), ("million points/s", points)]
 
 
