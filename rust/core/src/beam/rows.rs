@@ -134,7 +134,6 @@ impl<'a> Rows<'a> {
         for edge in &seen.edges {
             self.add_edge(edge);
         }
-        self.normal.flush();
         (self.normal, self.tally)
     }
 
