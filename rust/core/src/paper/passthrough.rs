@@ -60,7 +60,7 @@ impl PassThrough {
     fn corners(&self) -> [Point3<f64>; 8] {
         std::array::from_fn(|corner| {
             Point3::from(std::array::from_fn(|axis| {
-                let (end, sign) = match corner >> axis & 1 {
+                let (end, sign) = match (corner >> axis) & 1 {
                     0 => (self.min_m[axis], -1.0),
                     _ => (self.max_m[axis], 1.0),
                 };
