@@ -141,6 +141,8 @@ def no_lidar(
     if near:
         facts.append(("closest", _closest(near[0])))
         hint = f"sensors that are known: {', '.join(model for model, _ in models)}"
+    if near and near[0]["positions"] + near[0]["companions"]:
+        hint = "record the sensor's data packets as well: they go to another port"
     if near and near[0]["closest_model"]:
         source, model = near[0]["source"], near[0]["closest_model"]
         hint = f"name the model: --sensor {source}={model}"

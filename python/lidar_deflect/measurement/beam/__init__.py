@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.errors import MeasurementError
+from lidar_deflect.measurement.beam import rotation
 from lidar_deflect.measurement.beam.adjustment import LAST, Solved, solve
-from lidar_deflect.measurement.beam.check import contradictions, objects
+from lidar_deflect.measurement.beam.budget import budget_of
+from lidar_deflect.measurement.beam.check import checks, objects
 from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
+from lidar_deflect.measurement.beam.outline import outline_of
+from lidar_deflect.measurement.beam.swung import widened
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
 from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States, joined_names
 
@@ -60,9 +64,24 @@ def measure(inputs: Inputs) -> States:
     reference, spread = _reference(inputs, s_m, followed, times_ns, covariance)
     moved = followed.values[..., :3] - reference
     uncertainty = over_time(covariance, spread, solved, expected, followed, times_ns, moved)
+    if expected.swings:
+        uncertainty = widened(uncertainty, covariance, moved)
     of = slice(0, len(sections))
     status, reason = _grades(followed)
+    asked = checks(inputs, solved, s_m, covariance)
     every = max(1, round(inputs.rate_hz))
+    line = slice(len(sections), None)
+    turned = np.concatenate(
+        [
+            rotation.rotations_rad(s_m[line], followed.values[:, line, :3], reference[line]),
+            rotation.over_time(
+                rotation.variance_rad2(s_m[line], covariance, line),
+                np.array(solved.shares),
+                expected.at(times_ns),
+            ),
+        ],
+        axis=2,
+    )
     return States(
         time_ns=times_ns,
         names=names,
@@ -78,7 +97,7 @@ def measure(inputs: Inputs) -> States:
         status=np.repeat(status[:, None], len(sections), axis=1),
         reason=np.repeat(reason[:, None], len(sections), axis=1),
         blade_points=followed.used,
-        contour=_contour(times_ns, stations, followed, uncertainty, len(sections), every),
+        contour=_contour(times_ns, stations, followed, uncertainty, turned, every),
         points=_points(inputs, followed),
         rejected=objects(solved),
         u_position_m=uncertainty.position_m[:, of],
@@ -87,8 +106,11 @@ def measure(inputs: Inputs) -> States:
         twist_deg=np.degrees(followed.values[:, of, 3]),
         u_twist_deg=np.degrees(uncertainty.twist_rad[:, of]),
         evidence=_evidence(expected, solved),
-        warnings=_warnings(solved),
-        failed=contradictions(inputs, solved),
+        warnings=[*_warnings(solved), *(c.text for c in asked if not c.passed and c.only_warns)],
+        failed=[c.text for c in asked if not c.passed and not c.only_warns],
+        outline=outline_of(solved, names, s_m[of]),
+        checks=asked,
+        budget=budget_of(solved, names, s_m[of]),
     )
 
 
@@ -156,10 +178,11 @@ def _contour(
     stations: list[float],
     followed: Followed,
     uncertainty: Any,
-    first: int,
+    turned: Floats,
     every: int,
 ) -> Mapping[str, Any]:
-    """Blade line once a second."""
+    """Blade line once a second; `turned` are rotations about x and y and their uncertainties."""
+    first = followed.values.shape[1] - len(stations)
     known = np.flatnonzero(~np.isnan(followed.values).any(axis=(1, 2)))[::every]
     values = followed.values[known, first:].reshape(-1, 4)
     sigma = uncertainty.position_m[known, first:].reshape(-1, 3)
@@ -168,6 +191,10 @@ def _contour(
         "s_m": np.tile(stations, len(known)),
         **{f"{axis}_m": values[:, i] for i, axis in enumerate("xyz")},
         **{f"u{axis}_m": sigma[:, i] for i, axis in enumerate("xyz")},
+        **{
+            name: turned[known, :, i].ravel()
+            for i, name in enumerate(("rx_rad", "ry_rad", "urx_rad", "ury_rad"))
+        },
         "twist_deg": np.degrees(values[:, 3]),
         "utwist_deg": np.degrees(uncertainty.twist_rad[known, first:].ravel()),
         "status": ["ok"] * len(values),
@@ -183,6 +210,7 @@ def _points(inputs: Inputs, followed: Followed) -> Mapping[str, Any]:
         "lidar": [inputs.lidars[number] for number in points["lidar"][order]],
         "ring": points["ring"][order],
         "s_m": points["s_m"][order],
+        "chord": points["chord"][order],
         "residual_m": points["residual_m"][order],
         **{f"{axis}_m": points["xyz_m"][order, i] for i, axis in enumerate("xyz")},
     }

@@ -29,6 +29,12 @@ OVERLAP_NS = 250_000_000
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
 FITTING = 0.8
 """A stretch of which fewer echoes than this share lie on the blade was not found."""
+SWAY_M = (0.15, 0.15, 0.04, 0.04)
+"""Standard deviations of the sway in its first mode in x and y and in its second, at the tip ..."""
+SWING_M = (4.0, 4.0, 0.5, 0.5)
+"""... and of a blade that is swung."""
+SWING_GATES = ((6.0, 5.0), (6.0, 5.0), (3.0, 3.0), (3.0, 2.0), (1.5, 1.5), *GATES)
+"""The swing is as far away as the blade swings: the search begins wide."""
 CHUNK = 48
 """Stretches that are worked on between two looks at Ctrl-C."""
 
@@ -124,6 +130,7 @@ def _between(
     moments: Sequence[Times],
 ) -> list[Any]:
     native = solved.native
+    gates, sway_m = (SWING_GATES, SWING_M) if expected.swings else (GATES, SWAY_M)
     return native.follow(
         seen,
         spans,
@@ -131,7 +138,8 @@ def _between(
         [times_ns.tolist() for times_ns in moments],
         s_m.tolist(),
         list(solved.shares),
-        list(GATES),
+        list(gates),
+        list(sway_m),
     )
 
 
@@ -155,5 +163,5 @@ def _count(
 
 
 def _joined(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "xyz_m")
+    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "chord", "xyz_m")
     return {name: np.concatenate([part[name] for part in parts]) for name in names}

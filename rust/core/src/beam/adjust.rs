@@ -394,7 +394,7 @@ impl Adjustment {
     }
 
     /// What is known before the data.
-    fn prior(&self, stage: Stage) -> Normal {
+    pub(super) fn prior(&self, stage: Stage) -> Normal {
         let mut prior = Normal::new(self.free.clone());
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
         for (place, i) in self.free.clone().enumerate() {

@@ -6,6 +6,7 @@
 
 pub mod adjust;
 pub mod axis;
+pub mod budget;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;
@@ -14,6 +15,7 @@ pub mod gather;
 pub mod layout;
 pub mod mesh;
 pub mod normal;
+pub mod outline;
 pub mod posed;
 pub mod rig;
 pub mod rows;

@@ -64,6 +64,8 @@ pub struct Used {
     pub residual_m: f64,
     /// Measured point, world, metres.
     pub point: Vector3<f64>,
+    /// Chord fraction at which its ray meets the model; below 0 on the pressure side.
+    pub chord: f64,
 }
 
 impl Weights {
@@ -137,6 +139,14 @@ impl<'a> Rows<'a> {
         (self.normal, self.tally)
     }
 
+    /// The rows of the edges alone.
+    pub(super) fn of_edges(mut self) -> Normal {
+        for edge in &self.adjustment.problem.holds[self.hold].seen.edges {
+            self.add_edge(edge);
+        }
+        self.normal
+    }
+
     /// Adds one echo; gives the arc length at which it met the blade, for the next one.
     fn add_echo(&mut self, echo: &Echo, hint: Option<f64>) -> Option<f64> {
         let lidar = &self.lidars[echo.lidar];
@@ -163,6 +173,7 @@ impl<'a> Rows<'a> {
             s_m: self.arc_m(&hit.contact),
             residual_m: residual,
             point: lidar.origin + direction * (hit.range_m + residual),
+            chord: self.chord(&hit.contact),
         };
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
             self.tally.rejected.push(met);
@@ -188,6 +199,15 @@ impl<'a> Rows<'a> {
             let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
             blade.hit(mesh, &lidar.origin, direction, s_m)
         })
+    }
+
+    fn chord(&self, contact: &Contact) -> f64 {
+        let is_pressure = contact.vertex >= self.adjustment.problem.mesh.outline[0].len() / 2;
+        if is_pressure {
+            -contact.x_c
+        } else {
+            contact.x_c
+        }
     }
 
     fn arc_m(&self, contact: &Contact) -> f64 {
@@ -251,6 +271,10 @@ impl<'a> Rows<'a> {
             .shape
             .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
+        if self.adjustment.free.end > layout.len() {
+            // A strain is fitted as a check: everything moves away from the root.
+            row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
+        }
         row
     }
 

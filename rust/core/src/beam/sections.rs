@@ -20,9 +20,9 @@ pub struct Sections {
 
 /// One section of one state.
 pub(super) struct Place {
-    contact: Contact,
+    pub(super) contact: Contact,
     chord: Vector3<f64>,
-    point: Vector3<f64>,
+    pub(super) point: Vector3<f64>,
     sway: Vec<(usize, f64)>,
 }
 
@@ -32,6 +32,14 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn sections(&self, s_m: &[f64], gates: &Gates) -> Result<Sections, BeamError> {
+        let (values, rows) = self.section_rows(s_m);
+        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
+        let covariance = rows.tr_mul(&factor.solve(&rows));
+        Ok(Sections { values, covariance })
+    }
+
+    /// Values of the sections of all holds and, in four columns each, their slopes by all unknowns.
+    pub(super) fn section_rows(&self, s_m: &[f64]) -> (Vec<[f64; 4]>, DMatrix<f64>) {
         let posed: Vec<Posed> = (0..self.problem.holds.len())
             .map(|hold| self.posed(hold))
             .collect();
@@ -55,9 +63,7 @@ impl Adjustment {
                 );
             }
         }
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let covariance = rows.tr_mul(&factor.solve(&rows));
-        Ok(Sections { values, covariance })
+        (values, rows)
     }
 
     /// Position and twist of a section of a hold, with their slopes in four columns from `first`.
@@ -149,7 +155,12 @@ impl Adjustment {
     }
 
     /// What the surface unknowns add to the point of the drawing, and the sway where it is not in it.
-    fn correction(&self, of: (&Posed, usize), place: &Place, has_sway: bool) -> Vector3<f64> {
+    pub(super) fn correction(
+        &self,
+        of: (&Posed, usize),
+        place: &Place,
+        has_sway: bool,
+    ) -> Vector3<f64> {
         let mut rows = DMatrix::zeros(self.layout.len(), 3);
         for axis in 0..3 {
             let along = Vector3::ith(axis, 1.0);
@@ -166,7 +177,7 @@ impl Adjustment {
     }
 
     /// Adds to a column how all unknowns move a place along `along` and turn it about `turn`.
-    fn fill(
+    pub(super) fn fill(
         &self,
         rows: &mut DMatrix<f64>,
         column: usize,

@@ -17,8 +17,6 @@ const KNOT_NS: i64 = 100_000_000;
 const LOAD_SHARE: f64 = 0.02;
 /// Weight of what the holds on both sides tell of a state's own unknowns: it is known to a fifth.
 const OWN_TIGHTNESS: f64 = 25.0;
-/// Standard deviations of the sway while the load changes, metres at the tip.
-const SWAY_M: [f64; 4] = [0.15, 0.15, 0.04, 0.04];
 
 /// A stretch of time to follow.
 #[derive(Debug, Clone)]
@@ -29,6 +27,8 @@ pub struct Stretch {
     pub span_ns: (i64, i64),
     /// Load at its knots, share of full load; as many as [`load_knots`] gives.
     pub load: Vec<f64>,
+    /// Standard deviations of its sway in the first mode in x and y and in the second, metres at the tip.
+    pub sway_m: [f64; 4],
 }
 
 /// Instants at which a stretch wants the load: one per knot.
@@ -62,7 +62,7 @@ impl Adjustment {
             trust: self.problem.trust,
             shape: self.problem.shape.clone(),
         };
-        let mut part = self.blank(problem);
+        let mut part = self.blank(problem, &stretch.sway_m);
         self.hand_down(&mut part, stretch, loads, middle);
         part.linearise()?;
         Ok(part)
@@ -82,15 +82,15 @@ impl Adjustment {
     }
 
     /// An adjustment of one hold with this one's lidars and weights, without values.
-    fn blank(&self, problem: Problem) -> Adjustment {
+    fn blank(&self, problem: Problem, sway_m: &[f64; 4]) -> Adjustment {
         let own = family::hold_unknowns(&problem.holds[0].loading, &problem.trust);
         let mut layout = self.layout.clone();
         layout.own = vec![own.len()];
         layout.knots = vec![knots(problem.holds[0].span_ns, KNOT_NS)];
-        layout.modes = SWAY_M.len() + 1;
+        layout.modes = sway_m.len() + 1;
         let free: Range<usize> = layout.shared..layout.lidar_at(0);
         let mut modes_m = vec![LOAD_SHARE];
-        modes_m.extend(SWAY_M);
+        modes_m.extend(sway_m);
         let mut blank = self.like(problem, layout);
         blank.free = free;
         blank.modes_m = modes_m;

@@ -4,7 +4,7 @@ use std::collections::{HashMap, VecDeque};
 
 use super::arrivals::{Arrival, Arrivals, Ordered, mark};
 use super::report::{Pause, ScanReport, StreamInfo};
-use super::{ScanOptions, StreamKey};
+use super::{ScanOptions, StreamKey, packets};
 use crate::angle::Arc;
 use crate::capture::Datagram;
 use crate::clock::ClockModel;
@@ -146,6 +146,12 @@ impl<S: Sink> Reader<S> {
 
     /// Takes the next datagram.
     pub fn push(&mut self, datagram: &Datagram<'_>) {
+        for packet in packets(datagram) {
+            self.take_packet(&packet);
+        }
+    }
+
+    fn take_packet(&mut self, datagram: &Datagram<'_>) {
         let key = self.options.key(datagram);
         let Some(lane) = self.lanes.get_mut(&key).filter(|lane| !lane.is_done) else {
             return;

@@ -222,6 +222,7 @@ impl BeamAdjustment {
         s_m: Vec<f64>,
         hold_loads: Vec<f64>,
         gates: Vec<(f64, f64)>,
+        sway_m: [f64; 4],
     ) -> BorderResult<
         Vec<
             Option<(
@@ -238,6 +239,7 @@ impl BeamAdjustment {
                 seen: seen.seen.clone(),
                 span_ns: *span,
                 load: load.clone(),
+                sway_m,
             })
             .collect();
         let gates: Vec<Gates> = gates
@@ -282,6 +284,69 @@ impl BeamAdjustment {
         values.into_pyarray(py)
     }
 
+    /// Names of what values rest on, and the variance that each gives to x, y, z, the changes dx, dy, dz
+    /// and d since the first hold, and the twist, (groups, holds * sections * 8).
+    fn budget<'py>(
+        &self,
+        py: Python<'py>,
+        s_m: Vec<f64>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.budget(&s_m, &gates))??;
+        let names = found.groups.iter().map(|group| group.0).collect();
+        let values = found.groups.into_iter().flat_map(|group| group.1).collect();
+        let count = 8 * s_m.len() * self.core.problem.holds.len();
+        Ok((names, arrays::table(py, values, count)?))
+    }
+
+    /// By unknown: its group, by how much the data moved it, its standard deviation before and after.
+    #[allow(clippy::type_complexity)] // the two that Python unpacks
+    fn posterior<'py>(
+        &self,
+        py: Python<'py>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.posterior(&gates))??;
+        let names = found.iter().map(|known| known.0).collect();
+        let values = found.iter().flat_map(|known| known.1).collect();
+        Ok((names, arrays::table(py, values, 3)?))
+    }
+
+    /// Free axial strain of every hold, as if nothing kept its length, and the joint covariance.
+    #[allow(clippy::type_complexity)] // the two that Python unpacks
+    fn strains<'py>(
+        &self,
+        py: Python<'py>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let gates = last_gates(echo_m, edge_m);
+        let (strain, covariance) = compute(py, self.threads, || self.core.strains(&gates))??;
+        let count = strain.len();
+        Ok((
+            strain.as_slice().to_vec().into_pyarray(py),
+            arrays::table(py, covariance.as_slice().to_vec(), count)?,
+        ))
+    }
+
+    /// Outlines of the sections in every hold, (holds * sections * points, 4): x, y, z in metres and
+    /// the standard deviation along the normal.
+    fn outlines<'py>(
+        &self,
+        py: Python<'py>,
+        s_m: Vec<f64>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.outlines(&s_m, &gates))??;
+        Ok(arrays::rows(py, found)?)
+    }
+
     /// Where groups of unknowns start.
     fn layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let layout = &self.core.layout;
@@ -317,6 +382,7 @@ fn met<'py>(py: Python<'py>, echoes: &[Used]) -> PyResult<Bound<'py, PyDict>> {
         "residual_m",
         column(py, echoes.iter().map(|e| e.residual_m)),
     )?;
+    told.set_item("chord", column(py, echoes.iter().map(|e| e.chord)))?;
     let points: Vec<[f64; 3]> = echoes.iter().map(|e| e.point.into()).collect();
     told.set_item("xyz_m", arrays::rows(py, points)?)?;
     Ok(told)
@@ -327,6 +393,14 @@ fn column<T: numpy::Element>(
     values: impl Iterator<Item = T>,
 ) -> Bound<'_, PyArray1<T>> {
     values.collect::<Vec<T>>().into_pyarray(py)
+}
+
+fn last_gates(echo_m: f64, edge_m: f64) -> Gates {
+    Gates {
+        echo_m,
+        edge_m,
+        stage: Stage::All,
+    }
 }
 
 fn stage_named(name: &str) -> Result<Stage, InvalidValue> {

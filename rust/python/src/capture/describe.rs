@@ -23,6 +23,11 @@ pub fn scan<'py>(py: Python<'py>, report: &ScanReport, files: &FilesReport) -> D
     all.set_item("datagrams", report.datagrams)?;
     let pauses: Vec<(i64, i64)> = report.pauses.iter().map(|p| (p.from.0, p.to.0)).collect();
     all.set_item("pauses_ns", pauses)?;
+    let unused = report.unused_units();
+    let unused: Vec<(&str, String)> = unused
+        .map(|file| (file.name.as_str(), file.first_line()))
+        .collect();
+    all.set_item("unused_files", unused)?;
     let fragments = PyDict::new(py);
     fragments.set_item("fragments", files.fragments.fragments)?;
     fragments.set_item("datagrams", files.fragments.datagrams)?;
@@ -128,6 +133,7 @@ fn other<'py>(py: Python<'py>, stream: &OtherStream) -> Dict<'py> {
     dict.set_item("port", stream.key.port)?;
     dict.set_item("packets", stream.packets)?;
     dict.set_item("positions", stream.positions)?;
+    dict.set_item("companions", stream.companions)?;
     dict.set_item("payload_bytes", stream.payload_len)?;
     dict.set_item("rate_hz", stream.rate_hz)?;
     let closest = stream.closest.as_ref();
