@@ -101,7 +101,8 @@ def measure(
     for told in explanation.largest(result) if verbose else ():
         talk.detail(told.text())
     talk.note(f"written: {out}")
-    talk.timings(timings, {**result.run["timings_s"], "total": perf_counter() - begun})
+    seconds = {**result.run["timings_s"], "total": perf_counter() - begun}
+    talk.timings(timings, seconds, result.run)
     return code
 
 

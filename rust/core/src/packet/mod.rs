@@ -437,4 +437,10 @@ pub trait Decoder: Send + Sync {
     ) {
         self.decode(payload, place, out);
     }
+
+    /// Whether a return of `payload` may lie in a direction within `bearings`, counted from x towards y,
+    /// half a metre or farther from the z axis. A decoder that cannot tell says that it may.
+    fn may_meet(&self, _payload: &[u8], _bearings: Arc) -> bool {
+        true
+    }
 }

@@ -8,6 +8,7 @@ pub mod hdl64e;
 mod lanes;
 pub mod position;
 pub mod puck;
+mod reach;
 pub(super) mod rotation;
 mod rows;
 mod table;
