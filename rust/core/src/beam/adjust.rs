@@ -28,6 +28,8 @@ const KNOT_NS: i64 = 200_000_000;
 const LARGEST_STEP: f64 = 3.0;
 /// The same where deviations are those of blades in general.
 const LARGEST_VAGUE_STEP: f64 = 0.3;
+/// Gate from which on residuals tell of the data, not of a blade that is elsewhere, metres.
+const LEARNED_M: f64 = 0.1;
 /// Gate at which steps are held back as a prior would, metres.
 const FREE_GATE_M: f64 = 0.025;
 /// A step that takes back so much of the last one is halved: the truth lies between both.
@@ -386,17 +388,16 @@ impl Adjustment {
         if excess > 1.0 {
             step /= excess;
         }
-        if step.dot(&self.last_step) < -TURNED_BACK * self.last_step.norm_squared() {
-            step *= 0.5;
+        if self.is_vague() {
+            self.settle(&mut step);
         }
-        self.last_step.copy_from(&step);
         self.values += &step;
         self.rig.values += step.rows(rig, count);
         self.values.rows_mut(rig, count).fill(0.0);
         if self.free.contains(&self.layout.shape_at()) {
             self.build();
         }
-        if gates.stage == Stage::All {
+        if gates.stage == Stage::All && gates.echo_m <= LEARNED_M {
             self.weights.learn(&tallies);
         }
         Ok(Step { largest, tallies })
@@ -418,6 +419,14 @@ impl Adjustment {
             tallies.push(tally);
         }
         (sum, tallies)
+    }
+
+    /// Halves a step that takes the last one back.
+    fn settle(&mut self, step: &mut DVector<f64>) {
+        if step.dot(&self.last_step) < -TURNED_BACK * self.last_step.norm_squared() {
+            *step *= 0.5;
+        }
+        self.last_step.copy_from(step);
     }
 
     /// Holds back, while gates are wide, what a blade without a drawing could do far from where it is.
