@@ -397,8 +397,8 @@ impl Adjustment {
         if self.free.contains(&self.layout.shape_at()) {
             self.build();
         }
-        if gates.stage == Stage::All && gates.echo_m <= LEARNED_M {
-            self.weights.learn(&tallies);
+        if gates.stage == Stage::All {
+            self.weights.learn(&tallies, gates.echo_m <= LEARNED_M);
         }
         Ok(Step { largest, tallies })
     }

@@ -79,9 +79,13 @@ pub struct EdgeMet {
 }
 
 impl Weights {
-    /// Takes from the residuals the noise of each lidar and what neighbouring data have in common.
-    pub fn learn(&mut self, tallies: &[Tally]) {
+    /// Takes from the residuals the noise of each lidar and, once the blade is found, what neighbouring
+    /// data have in common: before, they have in common that it is elsewhere.
+    pub fn learn(&mut self, tallies: &[Tally], is_found: bool) {
         self.learn_noise(tallies);
+        if !is_found {
+            return;
+        }
         self.surface_m = common::surface_m(tallies, &self.noise_m, self.surface_m);
         let of = |tally| Common::of(tally, &self.noise_m);
         self.common = tallies.iter().map(of).collect();
