@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
+PEERS := target/peers
 RUST := Cargo.toml Cargo.lock $(shell find rust -path rust/fuzz -prune -o \( -name '*.rs' -o -name Cargo.toml \) -print)
 
 .PHONY: demo test test-rust test-python lint format bench fuzz wheel gallery lock clean help cargo
@@ -34,8 +35,10 @@ format: $(VENV)/tested ## rewrite the sources in the house format
 	$(BIN)/ruff format
 	$(BIN)/ruff check --fix
 
-bench: cargo ## throughput, see benches/README.md
+bench: $(VENV)/built $(PEERS)/ready cargo ## throughput, and other programs in turn with ours: see benches/README.md
 	cargo bench
+	cargo build --release --package lidar-deflect-files --example throughput
+	PYTHONPATH=python $(PEERS)/$(notdir $(BIN))/python benches/peers/suite.py $(ONLY)
 
 # TARGET is a file of rust/fuzz/fuzz_targets; needs a nightly compiler and cargo install cargo-fuzz.
 TARGET ?= datagram
@@ -74,6 +77,14 @@ $(VENV)/ready: requirements/run.txt | cargo
 
 $(VENV)/built: $(VENV)/ready $(RUST) pyproject.toml
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@
+
+# What benches hold ours against; Open3D is not there for every Python and system.
+$(PEERS)/ready: requirements/run.txt benches/peers/requirements.txt
+	$(PYTHON) -m venv $(PEERS)
+	$(PEERS)/$(notdir $(BIN))/python -m pip install --quiet --disable-pip-version-check -r requirements/run.txt
+	$(PEERS)/$(notdir $(BIN))/python -m pip install --quiet --disable-pip-version-check -r benches/peers/requirements.txt
+	-$(PEERS)/$(notdir $(BIN))/python -m pip install --quiet --disable-pip-version-check open3d
 	@touch $@
 
 $(VENV)/tested: requirements/test.txt $(VENV)/ready

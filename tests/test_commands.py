@@ -130,6 +130,8 @@ def test_the_road_from_capture_to_report(short_test: Path, tmp_path: Path) -> No
     document = json.loads(done.out)
     assert document["schema"] == "lidar-deflect.measure/1"
     assert {row["step"] for row in document["steps"]} == {"0 %", "100 %"}
+    assert "MB/s" in done.err
+    assert "million points/s" in done.err
     for reference in ("truth.parquet", "wire.csv", "theory.csv"):
         done = command_line("compare", results, "--reference", short_test / reference)
         assert done.code == 0, done.err

@@ -127,7 +127,7 @@ def test_an_e1_whatever_its_frames_count_from(tmp_path: Path, counts_from: int) 
     kept = [one for number, one in enumerate(sent) if number not in lost]
     opened = capture.open(write_pcap(tmp_path / "a.pcap", kept))
     (stream,) = opened.streams
-    assert (stream.model, stream.packets, stream.lost) == ("rs-e1", len(kept), len(lost))
+    assert (stream.model, stream.packets, stream.lost) == ("e1", len(kept), len(lost))
     found = columns(opened)
     range_m = (1_000 + found["intensity"]) * 0.005
     np.testing.assert_allclose(found["range_m"], range_m, rtol=1e-6)
@@ -141,7 +141,7 @@ def test_info_shows_no_turns_of_a_sensor_without_a_rotor(
     path = write_pcap(tmp_path / "a.pcap", [*mid360(0.2), *e1(0.2, 0)])
     assert run(["info", str(path), "--json"]) == 0
     streams = json.loads(capsys.readouterr().out)["streams"]
-    assert [(one["model"], one["rpm"]) for one in streams] == [("mid360", None), ("rs-e1", None)]
+    assert [(one["model"], one["rpm"]) for one in streams] == [("mid360", None), ("e1", None)]
     assert run(["info", str(path)]) == 0
     lines = capsys.readouterr().out.splitlines()
     (row,) = [line.split() for line in lines if line.split()[2:3] == ["mid360"]]

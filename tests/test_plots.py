@@ -21,6 +21,8 @@ class Result:
     health: pl.DataFrame = field(default_factory=folders.health)
     comparison: pl.DataFrame | None = None
     contour: pl.DataFrame | None = None
+    outline: pl.DataFrame | None = None
+    points: pl.DataFrame | None = None
     config: dict[str, Any] | None = None
 
 
@@ -209,6 +211,8 @@ DRAWN = (
     "pose_uncertainty",
     "drift",
     "residuals",
+    "residual_map",
+    "section_cut",
     "comparison",
     "health",
     "cycles",
@@ -248,3 +252,50 @@ def test_the_palette_keeps_its_distance_and_changes_dash_when_it_starts_again() 
     assert len({(style.colour(k), style.dash(k)) for k in range(16)}) == 16
     assert style.translucent("#0072B2", 0.5) == "rgba(0,114,178,0.5)"
     assert style.stretches([True, True, False, True]) == [(0, 1), (3, 3)]
+
+
+def surface_of(step: str = "100 %") -> tuple[Result, pl.DataFrame]:
+    import beam_folders
+
+    own = result(beam_folders.deflection())
+    own.outline = beam_folders.outline(own.steps)
+    row = own.steps.filter(pl.col("step") == step, pl.col("section") == "S100").row(0, named=True)
+    columns: dict[str, tables.Values] = dict.fromkeys(tables.SCHEMAS["points"].names)
+    columns |= {"time": [row["from"]] * 4, "t_s": [row["t_s"]] * 4, "lidar": ["L1"] * 4}
+    columns |= {"ring": [3] * 4, "s_m": [100.0, 100.1, 99.9, 103.0], "residual_m": [0.002] * 4}
+    columns |= {"x_m": row["x_m"] + np.array([0.5, 0.0, -0.5, 0.0])}
+    columns |= {"y_m": [row["y_m"] - 0.2] * 4, "z_m": [row["z_m"]] * 4, "chord": [-0.5] * 4}
+    own.points = tables.build("points", columns)
+    return own, own.outline
+
+
+def test_a_section_cut_shows_outline_band_and_the_points_near_it() -> None:
+    own, outline = surface_of()
+    figure = Plots(own).section_cut("S100", "100 %")
+    surface = trace(figure, "surface")
+    assert len(surface.x) == 40 + 1  # closed
+    assert np.ptp(surface.x) == pytest.approx(2.0, abs=0.01)
+    assert np.ptp(surface.y) == pytest.approx(0.4, abs=0.01)
+    band = trace(figure, "95 % band")
+    # 1.96 * 3 mm outside on both ends of the chord.
+    assert np.ptp(band.x) == pytest.approx(2.0 + 2 * 1.96 * 0.003, abs=1e-3)
+    assert len(trace(figure, "L1").x) == 3  # the fourth lies 3 m further out
+    assert figure.layout.yaxis.scaleanchor == "x"
+    assert outline.height == 40 * 3 * own.steps["step"].n_unique()
+
+
+def test_a_residual_map_has_the_mean_of_every_patch_with_enough_points() -> None:
+    own, _ = surface_of()
+    (suction, pressure) = Plots(own).residual_map().data
+    assert len(suction.z) == 0
+    assert list(pressure.z) == pytest.approx([2.0])
+    assert pressure.y[0] == pytest.approx(0.5, abs=0.05)
+
+
+def test_rotations_have_bands_where_their_uncertainty_is_known() -> None:
+    import beam_folders
+
+    own = result(beam_folders.deflection())
+    own.contour = beam_folders.contour(own.deflection)
+    bands = [each for each in Plots(own).rotation().data if each.fill == "toself"]
+    assert len(bands) == 3 * own.steps["step"].n_unique()

@@ -237,3 +237,15 @@ def test_a_value_has_the_digits_of_its_uncertainty(u_m: float, value: str, inter
     assert (cell.text, cell.interval) == (value, f"±{digits.THIN}{interval}")
     assert cell.value == pytest.approx(4966.81)
     assert cell.u == pytest.approx(2e3 * u_m)
+
+
+def test_the_budget_of_the_largest_step_has_a_row_per_source(tmp_path: Path) -> None:
+    zero = dict.fromkeys(("x_m", "y_m", "z_m", "dx_m", "dy_m", "dz_m", "d_m"), 0.0)
+    terms = {"range_noise": zero | {"d_m": 0.0011}, "registration": zero | {"d_m": 0.0042}}
+    entries = [
+        {"step": step, "section": "S100", "s_m": 100.0, "terms": terms} for step in ("0 %", "100 %")
+    ]
+    found, _ = page(folders.write(tmp_path / "results", run={"method": "beam", "budget": entries}))
+    assert "registration of the lidars" in found.text
+    assert "8.4" in found.text  # twice 4.2 mm
+    assert "total deflection at 100" in found.text.replace("\u00a0", " ")

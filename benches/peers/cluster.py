@@ -1,20 +1,27 @@
-"""Time dbscan against scikit-learn on the same clouds, one run of each in turn.
+"""Hold dbscan against scikit-learn, `dbscan` of PyPI and Open3D on the same clouds."""
 
-python benches/peers/cluster.py [--sizes 1000 10000 100000] [--repeats 7]
-"""
+from __future__ import annotations
 
-import argparse
-import time
-from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from rounds import Row, ratio, rounds, table
 from sklearn.cluster import DBSCAN
+from sklearn.neighbors import radius_neighbors_graph
 
 from lidar_deflect.clustering import dbscan
 
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
 RADIUS_M = 0.15
 MIN_POINTS = 4
+ASKED = {10_000: 4, 100_000: 6, 1_000_000: 7, 10_000_000: 8}
+SLOW = 1_000_000
+"""From so many points on scikit-learn takes minutes in all, and fewer rounds do."""
+ONE, ALL, PEER = "ours, one thread", "ours, all threads", "scikit-learn"
 
 
 def surface(count: int) -> NDArray[np.float32]:
@@ -28,39 +35,81 @@ def surface(count: int) -> NDArray[np.float32]:
     return np.column_stack([x, y, z]).astype(np.float32)
 
 
-def timed(work: Callable[[], NDArray[np.int32]]) -> tuple[float, NDArray[np.int32]]:
-    start = time.perf_counter()
-    labels = work()
-    return time.perf_counter() - start, labels
+def peers(points: NDArray[np.float32]) -> dict[str, Callable[[], Any]]:
+    """Jobs of the others, one thread each, as far as they are installed."""
+    wide = points.astype(np.float64)
+    own = DBSCAN(eps=RADIUS_M, min_samples=MIN_POINTS, algorithm="kd_tree", n_jobs=1)
+    jobs: dict[str, Callable[[], Any]] = {PEER: lambda: own.fit(points).labels_}
+    try:
+        from dbscan import DBSCAN as PYPI
+
+        jobs["dbscan (PyPI)"] = lambda: PYPI(wide, eps=RADIUS_M, min_samples=MIN_POINTS)[0]
+    except ImportError as missing:
+        print(f"without dbscan: {missing}")
+    try:
+        import open3d
+
+        cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(wide))
+        jobs["Open3D"] = lambda: np.asarray(cloud.cluster_dbscan(RADIUS_M, MIN_POINTS))
+    except (ImportError, OSError) as missing:
+        print(f"without Open3D: {missing}")
+    return jobs
 
 
-def main() -> None:
-    """Print medians and ratios."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--sizes", type=int, nargs="+", default=[1_000, 10_000, 100_000])
-    parser.add_argument("--repeats", type=int, default=7)
-    options = parser.parse_args()
-    print("points    scikit-learn  1 thread  all threads  ratio (1 thread)  labels")
-    for count in options.sizes:
-        points = surface(count)
-        peer = DBSCAN(eps=RADIUS_M, min_samples=MIN_POINTS, algorithm="kd_tree", n_jobs=1)
-        runs = [
-            lambda points=points, peer=peer: peer.fit(points).labels_,
-            lambda points=points: dbscan(points, RADIUS_M, MIN_POINTS, threads=1),
-            lambda points=points: dbscan(points, RADIUS_M, MIN_POINTS),
-        ]
-        seconds, equal = [], True
-        for _ in range(options.repeats):
-            taken, labels = zip(*map(timed, runs), strict=True)
-            seconds.append(taken)
-            equal &= all(np.array_equal(labels[0], other) for other in labels[1:])
-        theirs, one, all_threads = np.median(seconds, axis=0)
-        verdict = "equal" if equal else "DIFFERENT"
-        print(
-            f"{count:<9} {theirs:10.4f} s {one:8.4f} s {all_threads:10.4f} s"
-            f"  {theirs / one:10.1f}        {verdict}"
+def one_radius(count: int, repeats: int) -> list[Row]:
+    """Time one cloud."""
+    points = surface(count)
+    jobs = peers(points) | {
+        ONE: lambda: dbscan(points, RADIUS_M, MIN_POINTS, threads=1),
+        ALL: lambda: dbscan(points, RADIUS_M, MIN_POINTS),
+    }
+    timed = rounds(jobs, repeats if count < SLOW else 1)
+    print(f"\n{count} points, one radius\n{table(timed, count, 'points', ONE)}")
+    others = [name for name in timed if name not in (ONE, ALL)]
+    best = min(others, key=lambda name: timed[name].median_s)
+    differ = sum(int((timed[PEER].result != timed[name].result).sum()) for name in (ONE, ALL))
+    found = f"{ratio(timed, best, ONE):.1f}, labels that differ from scikit-learn's: {differ}"
+    rows = [
+        Row(f"DBSCAN, {count:.0e} points", f"{ASKED.get(count, 1)} x the best peer ({best})", found)
+    ]
+    if count == SLOW:
+        rows.append(Row("the same on two threads", f"5 x {best}", f"{ratio(timed, best, ALL):.1f}"))
+    return rows
+
+
+def radius_per_point(count: int, repeats: int) -> list[Row]:
+    """Time radii that grow with range, against a graph of neighbours cut by both radii."""
+    points = surface(count)
+    radii = RADIUS_M * (0.7 + 0.6 * points[:, 2].astype(np.float64) / points[:, 2].max())
+    wide = points.astype(np.float64)
+
+    def by_graph() -> NDArray[np.int64]:
+        graph = radius_neighbors_graph(
+            wide, radii.max(), mode="distance", include_self=True
+        ).tocoo()
+        both = np.minimum(radii[graph.row], radii[graph.col])
+        graph.data[graph.data > both] = 1e9
+        graph = graph.tocsr()
+        own = DBSCAN(eps=radii.max(), min_samples=MIN_POINTS, metric="precomputed", n_jobs=1)
+        return own.fit(graph).labels_
+
+    jobs: dict[str, Callable[[], Any]] = {
+        PEER: by_graph,
+        ONE: lambda: dbscan(points, radii, MIN_POINTS, threads=1),
+        ALL: lambda: dbscan(points, radii, MIN_POINTS),
+    }
+    timed = rounds(jobs, repeats)
+    print(f"\n{count} points, a radius per point\n{table(timed, count, 'points', ONE)}")
+    return [
+        Row(
+            f"DBSCAN, radius per point, {count:.0e}",
+            "5 x scikit-learn",
+            f"{ratio(timed, PEER, ONE):.1f}",
         )
+    ]
 
 
-if __name__ == "__main__":
-    main()
+def measure(repeats: int, sizes: tuple[int, ...] = (10_000, 100_000, 1_000_000)) -> list[Row]:
+    """Print one table per size; return what was asked."""
+    rows = [row for count in sizes for row in one_radius(count, repeats)]
+    return rows + radius_per_point(100_000, repeats)

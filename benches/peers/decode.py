@@ -1,27 +1,26 @@
-"""Hold the way from a VLP-16 capture to sweeps against velodyne-decoder, numpy and memory itself.
+"""Hold the way from a VLP-16 capture to sweeps against other libraries and memory itself.
 
-python benches/peers/decode.py CAPTURE [--repeats 7]
-
-All jobs read the same file, which is in the page cache after the first round. The numpy job is what
-a script would do: one array of packets, vectorised, positions only, no sweeps, loss or time.
+All jobs read the same file, which is in the page cache after the first round. The numpy and numba
+jobs are what a script would do: positions only, no sweeps, loss or time.
 """
 
 from __future__ import annotations
 
-import argparse
 import struct
 import warnings
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import captures
+import numba
 import numpy as np
 import velodyne_decoder
-from rounds import rounds, table
+from rounds import Own, Row, ratio, rounds, table
 
 import lidar_deflect as ld
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -29,6 +28,8 @@ ELEVATION_RAD = np.radians(
     [-15.0, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15],
 )
 PACKET_BYTES = 1206
+PYTHON, RUST = "capture.sweeps(), all columns", "the same in Rust, one thread"
+DECODER, NUMPY, NUMBA = "velodyne-decoder, read_pcap", "numpy, positions", "numba, positions"
 
 
 def payloads(path: Path) -> NDArray[np.uint8]:
@@ -48,11 +49,42 @@ def by_numpy(path: Path) -> int:
     azimuth = np.radians(blocks[:, 2:4].copy().view("<u2")[:, 0] * 0.01)
     echoes = blocks[:, 4:].reshape(-1, 2, 16, 3)
     range_m = echoes[..., :2].copy().view("<u2")[..., 0] * np.float32(0.002)
-    firing = (np.arange(2) * 55.296 + 0.0)[:, None] + np.arange(16) * 2.304
+    firing = (np.arange(2) * 55.296)[:, None] + np.arange(16) * 2.304
     angle = azimuth[:, None, None] + firing * 1e-6 * 20 * np.pi
     level = range_m * np.cos(ELEVATION_RAD)
     xyz = np.stack([level * np.cos(angle), -level * np.sin(angle), range_m * np.sin(ELEVATION_RAD)])
     return int((range_m > 0).sum()) + 0 * xyz.shape[0]
+
+
+@numba.njit(cache=False)
+def _loop(packets: Any, cos_up: Any, sin_up: Any, xyz: Any) -> int:
+    count = 0
+    for packet in packets:
+        for block in range(12):
+            start = block * 100
+            azimuth = (packet[start + 2] + 256 * packet[start + 3]) * (0.01 * np.pi / 180.0)
+            for shot in range(32):
+                place = start + 4 + 3 * shot
+                raw = packet[place] + 256 * packet[place + 1]
+                if raw == 0:
+                    continue
+                laser = shot % 16
+                after = shot // 16 * 55.296 + laser * 2.304
+                angle = azimuth + after * 1e-6 * 20 * np.pi
+                range_m = raw * 0.002
+                level = range_m * cos_up[laser]
+                xyz[count, 0] = level * np.cos(angle)
+                xyz[count, 1] = -level * np.sin(angle)
+                xyz[count, 2] = range_m * sin_up[laser]
+                count += 1
+    return count
+
+
+def by_numba(path: Path) -> int:
+    """Positions of all echoes by a compiled loop."""
+    packets = payloads(path)
+    xyz = np.empty((len(packets) * 384, 3), np.float32)
+    return int(_loop(packets, np.cos(ELEVATION_RAD), np.sin(ELEVATION_RAD), xyz))
 
 
 def by_velodyne_decoder(path: Path) -> int:
@@ -68,8 +100,14 @@ def by_us(path: Path) -> int:
     return sum(len(sweep.xyz) for sweep in capture.sweeps(capture.lidars[0]))
 
 
+def in_rust(path: Path) -> Own:
+    """Scan, then sweeps with all columns, streamed."""
+    seconds, _, points = captures.in_rust("sweeps", path)
+    return Own(seconds, points)
+
+
 def copied(path: Path) -> Callable[[], int]:
-    """Read the file's bytes once through memory: the limit."""
+    """Move the file's bytes once through memory: the limit."""
     data = np.frombuffer(path.read_bytes(), np.uint8)
     room = np.empty_like(data)
 
@@ -80,26 +118,31 @@ def copied(path: Path) -> Callable[[], int]:
     return copy
 
 
-def main() -> None:
-    """Print one table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("capture", type=Path)
-    parser.add_argument("--repeats", type=int, default=7)
-    options = parser.parse_args()
+def measure(repeats: int) -> list[Row]:
+    """Print one table; return what was asked."""
+    path = captures.single()
     warnings.simplefilter("ignore")
-    packets = len(payloads(options.capture))
+    packets = len(payloads(path))
     jobs: dict[str, Callable[[], Any]] = {
-        "velodyne-decoder, read_pcap": lambda: by_velodyne_decoder(options.capture),
-        "numpy, positions only": lambda: by_numpy(options.capture),
-        "capture.sweeps(), all columns": lambda: by_us(options.capture),
-        "memcpy of the file": copied(options.capture),
+        DECODER: lambda: by_velodyne_decoder(path),
+        NUMPY: lambda: by_numpy(path),
+        NUMBA: lambda: by_numba(path),
+        PYTHON: lambda: by_us(path),
+        RUST: lambda: in_rust(path),
+        "memcpy of the file": copied(path),
     }
-    timed = rounds(jobs, options.repeats)
-    print(f"{packets} packets")
-    print(table(timed, packets, "packets", "capture.sweeps(), all columns"))
+    timed = rounds(jobs, repeats)
+    print(table(timed, packets, "packets", RUST))
     for name, job in timed.items():
-        print(f"{name}: {job.result}")
-
-
-if __name__ == "__main__":
-    main()
+        print(f"  {name}: {job.result}")
+    return [
+        Row(
+            "VLP-16 capture to sweeps in Rust",
+            f"{asked} x {peer}",
+            f"{ratio(timed, peer, RUST):.1f}",
+        )
+        for asked, peer in ((30, DECODER), (2.2, NUMBA))
+    ] + [
+        Row("the same through Python", f"{asked} x {peer}", f"{ratio(timed, peer, PYTHON):.1f}")
+        for asked, peer in ((20, DECODER), (5, NUMPY))
+    ]

@@ -13,6 +13,23 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
+class Row:
+    """One line of the table of what was asked: how many times faster than what."""
+
+    job: str
+    asked: str
+    measured: str
+
+
+@dataclass(frozen=True)
+class Own:
+    """What a job gives that has taken its time itself, such as a program of its own."""
+
+    seconds: float
+    result: Any
+
+
+@dataclass(frozen=True)
 class Timed:
     """Seconds that one job took, and what it gave the last time."""
 
@@ -38,19 +55,26 @@ def rounds(jobs: Mapping[str, Callable[[], Any]], repeats: int) -> dict[str, Tim
     for _ in range(repeats):
         for name, job in jobs.items():
             start = time.perf_counter()
-            results[name] = job()
-            seconds[name].append(time.perf_counter() - start)
+            result = job()
+            taken = time.perf_counter() - start
+            seconds[name].append(result.seconds if isinstance(result, Own) else taken)
+            results[name] = result.result if isinstance(result, Own) else result
     return {name: Timed(tuple(seconds[name]), results[name]) for name in jobs}
+
+
+def ratio(timed: Mapping[str, Timed], theirs: str, ours: str) -> float:
+    """How many times faster one job is than another: median of the ratios of each round."""
+    pairs = zip(timed[theirs].seconds, timed[ours].seconds, strict=True)
+    return float(np.median([a / b for a, b in pairs]))
 
 
 def table(timed: Mapping[str, Timed], units: float, unit: str, ours: str) -> str:
     """Lines of job, median, spread, throughput and how much faster `ours` is."""
-    head = f"{'job':<34}{'median':>12}{'spread':>9}{unit + '/s':>14}{'ours is':>10}"
+    head = f"{'job':<38}{'median':>12}{'spread':>9}{unit + '/s':>14}{'ours is':>10}"
     lines = [head]
     for name, job in timed.items():
-        ratio = job.median_s / timed[ours].median_s
         lines.append(
-            f"{name:<34}{job.median_s:>10.4f} s{job.spread:>8.0%}"
-            f"{units / job.median_s:>14.3g}{ratio:>9.2f}x"
+            f"{name:<38}{job.median_s:>10.4f} s{job.spread:>8.0%}"
+            f"{units / job.median_s:>14.3g}{ratio(timed, name, ours):>9.2f}x"
         )
     return "\n".join(lines)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from lidar_deflect.clustering import RadiusModel as RadiusModel
     from lidar_deflect.clustering import dbscan as dbscan
     from lidar_deflect.errors import LidarDeflectError as LidarDeflectError
+    from lidar_deflect.explanation import explain as explain
     from lidar_deflect.pipeline import Test as Test
     from lidar_deflect.result import Result as Result
     from lidar_deflect.scene import Scene as Scene
@@ -32,6 +33,7 @@ _HOME = {
     "Sweep": "capture",
     "Test": "pipeline",
     "dbscan": "clustering",
+    "explain": "explanation",
     "open": "capture",
     "simulate": "simulation",
 }

@@ -458,6 +458,9 @@ def _document(found: _Found, last_ns: Mapping[str, int], *, quick: bool) -> dict
             for stream, end in zip(found.streams, ends, strict=True)
         ],
         "other_streams": described["other_streams"],
+        "unused_files": [
+            {"file": name, "content": content} for name, content in described["unused_files"]
+        ],
         "drops": described["drops"],
         "fragments": described["fragments"],
         "datagrams": described["datagrams"],

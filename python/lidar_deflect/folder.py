@@ -79,6 +79,11 @@ class Folder:
         return self._table("poses")
 
     @cached_property
+    def outline(self) -> pl.DataFrame:
+        """Table ``outline``."""
+        return self._table("outline")
+
+    @cached_property
     def cycles(self) -> pl.DataFrame:
         """Table ``cycles``."""
         return self._table("cycles")

@@ -76,6 +76,7 @@ class OpenedTest:
                 hint="correct source of [[lidars]]",
             )
         load = instruments.load(config, capture.first_time_ns)
+        steps = None if config.test.kind == "fatigue" else load  # a swing has no load steps
         return cls(
             config,
             capture.paths,
@@ -83,7 +84,7 @@ class OpenedTest:
             capture.lidars,
             capture.missing,
             load,
-            None if load is None else hold_finder.from_load(load.time_ns, load.value),
+            None if steps is None else hold_finder.from_load(steps.time_ns, steps.value),
             progress,
             threads,
         )

@@ -15,6 +15,7 @@ from lidar_deflect import capture as captures
 from lidar_deflect import (
     channels,
     comparison,
+    cycles,
     drift,
     instruments,
     matching,
@@ -240,7 +241,7 @@ def result_of(
 ) -> Result:
     """Tables and provenance of what a method found."""
     first_ns = opened.capture.first_time_ns
-    holds = _measured_holds(opened, states)
+    holds = _measured_holds(opened, inputs, states)
     root = instruments.root(opened.config, first_ns, opened.shifts)
     wires = instruments.wires(opened.config, first_ns, opened.shifts)
     deflection = tabulate.deflection(states, holds, load=opened.load, root=root, first_ns=first_ns)
@@ -258,18 +259,31 @@ def result_of(
         "poses": drifted.table,
         "channels": channels.to_table(given, first_ns),
     }
+    if states.outline:
+        frames["outline"] = _timed("outline", states.outline, first_ns)
     compared = comparison.configured(
         averages, settings, wires, instruments.prediction(opened.config)
     )
     if compared.height:
         frames["comparison"] = compared
+    found = cycles.find(deflection) if opened.config.test.kind == "fatigue" else None
+    if found is not None:
+        frames["cycles"] = found.table
     watch.lap("tables")
-    run = provenance.run_document(opened, inputs, states, method, health, watch, matches, drifted)
+    run = provenance.run_document(
+        opened, inputs, states, method, health, watch, matches, drifted, found
+    )
     return Result(frames, run, opened.config, inputs.calibration)
 
 
-def _measured_holds(opened: OpenedTest, states: States) -> Sequence[Hold]:
-    """Return the measured holds of the load channel, else those of the deflection itself."""
+def _measured_holds(opened: OpenedTest, inputs: Inputs, states: States) -> Sequence[Hold]:
+    """Return the measured holds of the load channel, else those of the deflection itself.
+
+    Of a fatigue test that is the unloaded hold alone: crests are no holds.
+    """
+    if opened.config.test.kind == "fatigue":
+        rest = inputs.unloaded_ns
+        return () if rest is None else (hold_finder.Hold(*rest, "0 %", None),)
     if opened.holds is None:
         return hold_finder.from_deflection(states.time_ns, states.farthest_m)
     return [hold for hold in opened.holds if hold.contains(states.time_ns).any()]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from lidar_deflect.config import Config
+    from lidar_deflect.cycles import Found
     from lidar_deflect.drift import Drift
     from lidar_deflect.matching import Match
     from lidar_deflect.measurement import Inputs, States
@@ -50,6 +51,7 @@ def run_document(
     watch: Stopwatch,
     matches: Sequence[Match] = (),
     drifted: Drift | None = None,
+    swung: Found | None = None,
 ) -> Mapping[str, Any]:
     """Document of run.json."""
     return {
@@ -65,12 +67,16 @@ def run_document(
             "warnings": list(inputs.calibration.warnings),
         },
         "evidence": states.evidence,
+        "self_check": [each.to_dict() for each in states.checks],
+        "budget": list(states.budget),
         "drift": drifted.facts if drifted else {},
+        **({} if swung is None else {"cycles": swung.facts}),
         "channel_clocks": [each.facts() for each in matches],
         "warnings": [
             *inputs.calibration.warnings,
             *states.warnings,
             *(drifted.warnings if drifted else ()),
+            *(swung.warnings if swung else ()),
             *(each.text() for each in matches if each.applied_s),
         ],
         "timings_s": {stage: round(seconds, 3) for stage, seconds in watch.laps.items()},

@@ -98,6 +98,16 @@ class Result:
         return self.frames["rejected"]
 
     @property
+    def outline(self) -> pl.DataFrame:
+        """Outlines of the sections in every hold; without rows under a method that has none."""
+        return self.frames["outline"] if "outline" in self.frames else tables.empty("outline")
+
+    @property
+    def cycles(self) -> pl.DataFrame:
+        """One row per section and cycle of a fatigue test; without rows of a static one."""
+        return self.frames["cycles"] if "cycles" in self.frames else tables.empty("cycles")
+
+    @property
     def health(self) -> pl.DataFrame:
         """Packets and points per second and lidar."""
         return self.frames["health"]

@@ -30,7 +30,7 @@ class StreamInfo:
         ``strongest``, ``last``, ``first``, ``second``, ``dual``, ``triple``, or a dual mode with
         its two returns in parentheses; ``single`` where packets do not tell which it is.
     rpm
-        Turns a minute in the mean; None for sensors without a rotor.
+        Turns a minute in the mean; None for sensors without a rotor, and where packets tell none.
     packets, lost, duplicated, late, too_late, foreign
         Data packets that were taken, that never came, came twice, came out of order, came too
         late to be put back; datagrams of the stream that are not the lidar's.
@@ -141,6 +141,8 @@ def no_lidar(
     if near:
         facts.append(("closest", _closest(near[0])))
         hint = f"sensors that are known: {', '.join(model for model, _ in models)}"
+    if near and near[0]["positions"] + near[0]["companions"]:
+        hint = "record the sensor's data packets as well: they go to another port"
     if near and near[0]["closest_model"]:
         source, model = near[0]["source"], near[0]["closest_model"]
         hint = f"name the model: --sensor {source}={model}"

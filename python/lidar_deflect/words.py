@@ -191,6 +191,14 @@ CAPTIONS = {
         "Distance of the blade's echoes from the model along the span. A trend in one lidar alone "
         "says that it stands elsewhere than believed."
     ),
+    "residual_map": (
+        "Mean distance of the blade's echoes from the model over span and chord: a patch that "
+        "stands out in colour is not shaped as the model has it."
+    ),
+    "section_cut": (
+        "Section {section} ({s_m:g} m) across its axis at {step}: surface as adjusted, its "
+        " 95 % band, and echoes within 0.3 m along the span."
+    ),
     "health": (
         "Every lidar in every second: lost packets, points on the blade, share of the turn whose "
         "packets arrived, and device clock minus UTC."
@@ -345,7 +353,7 @@ CHECKS_CAPTION = (
     "sum its terms, whatever the lidars say."
 )
 CHECKS_COLUMNS = {"check": "check", "found": "found", "limit": "limit", "result": "result"}
-PASSED, FAILED, UNKNOWN = "passed", "failed", "not judged"
+PASSED, FAILED, UNKNOWN, WARNS = "passed", "failed", "not judged", "look at it"
 CHECKS = {
     "hashes": "All tables come from one configuration",
     "totals": "Totals are the norms of their components",
@@ -419,6 +427,25 @@ BUDGET = {
         "beam, which changes with range and viewing angle, and the motion of the root.",
     ),
 }
+BUDGET_TERMS = {
+    "range_noise": "noise of single ranges",
+    "edge_steps": "step between shots at the edges",
+    "registration": "registration of the lidars",
+    "range_offsets": "range offsets, scale and elevation of the lidars",
+    "edge_angle": "angle by which edges lie outside of the silhouette",
+    "surface": "surface as built against its drawing",
+    "stiffness": "stiffness of the blade",
+    "weight_and_prebend": "weight and prebend",
+    "loads": "where and how the load enters",
+    "root": "rotation of the root",
+    "sway": "sway within the hold",
+    "reference": "the unloaded state that the deflection counts from",
+    "moment": "noise of this moment alone",
+}
+BUDGET_STEP_CAPTION = (
+    "Contributions to the expanded uncertainty (k = 2) of the total deflection at {step}, "
+    "millimetres; the root of the sum of their squares is the whole."
+)
 BUDGET_CAPTION = "Contributions to the expanded uncertainty (k = 2), as the run states them."
 NOT_CLAIMED = (
     "Not covered by any number here: a blade that differs from its drawing by more than the priors "
@@ -494,6 +521,13 @@ PLOT = {
     "lost": "lost (%)",
     "measured_model": "measured - model (mm)",
     "missing": "missing",
+    "no_outline": "this method gives no outline of this section",
+    "along_the_chord": "along the chord (m)",
+    "across_the_chord": "across (m)",
+    "band": "95 % band",
+    "surface": "surface",
+    "chord_suction": "chord, suction side",
+    "chord_pressure": "chord, pressure side",
     "no_cycles_were_found": "no cycles were found",
     "no_draw_wire_real_or_virtual_is_in": "no draw wire, real or virtual, is in the tables",
     "no_health_was_written": "no health was written",

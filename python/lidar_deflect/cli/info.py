@@ -110,6 +110,9 @@ def _notes(document: Mapping[str, Any]) -> str:
             remarks.setdefault(remark, []).append(stream["source"])
     for start, stop in document.get("pauses", ()):
         remarks.setdefault(f"nothing was recorded from {start} to {stop}", [])
+    for entry in document["unused_files"]:
+        remark = f"{entry['file']} lies beside the capture and is of no lidar in it"
+        remarks.setdefault(f"{remark}: {entry['content']}", [])
     return "\n".join(
         ": ".join([", ".join(who), what] if who else [what]) for what, who in remarks.items()
     )

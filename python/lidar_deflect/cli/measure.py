@@ -69,7 +69,7 @@ def measure(
     free(out, overwrite)
     changes = overrides(config, set_, sensor, beams)
     changes += [f"measure.method={method}"] if method else []
-    from lidar_deflect import comparison
+    from lidar_deflect import comparison, cycles, explanation
     from lidar_deflect.calibration import Calibration
     from lidar_deflect.pipeline import Test
 
@@ -96,9 +96,13 @@ def measure(
         "steps": result.steps.to_dicts(),
         "run": result.run,
     }
-    talk.result(document, comparison.table1(result.steps))
+    swung = cycles.text(result.run["cycles"]) if "cycles" in result.run else None
+    talk.result(document, swung or comparison.table1(result.steps))
+    for told in explanation.largest(result) if verbose else ():
+        talk.detail(told.text())
     talk.note(f"written: {out}")
-    talk.timings(timings, {**result.run["timings_s"], "total": perf_counter() - begun})
+    seconds = {**result.run["timings_s"], "total": perf_counter() - begun}
+    talk.timings(timings, seconds, result.run)
     return code
 
 
@@ -106,7 +110,8 @@ def verdict(result: "Result", talk: Talk) -> int:
     """Pass on what a reader of the result should know; return the exit code of a finished run."""
     for warning in result.run["warnings"]:
         talk.warn(warning)
-    if all(step.startswith("0 %") for step in measured_steps(result.steps)):
+    swings = result.config.test.kind == "fatigue"
+    if not swings and all(step.startswith("0 %") for step in measured_steps(result.steps)):
         talk.warn("no loaded hold was found: there is no deflection but noise")
     for gate in result.failed_gates:
         talk.warn(f"quality gate: {gate}")

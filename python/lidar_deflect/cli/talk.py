@@ -64,11 +64,18 @@ class Talk:
         """Say what a reader of the result should know; ``-q`` does not silence it."""
         print(f"warning: {text}", file=sys.stderr)
 
-    def timings(self, wanted: bool, seconds: Mapping[str, float]) -> None:
-        """Print how long each stage took."""
-        if wanted and seconds:
-            rows = [[stage, f"{value:.2f}"] for stage, value in seconds.items()]
-            print(table(["stage", "seconds"], rows), file=sys.stderr)
+    def timings(
+        self, wanted: bool, seconds: Mapping[str, float], run: Mapping[str, Any] | None = None
+    ) -> None:
+        """Print how long each stage took, and how fast it got through the capture of a run."""
+        if not (wanted and seconds):
+            return
+        amounts = _amounts(run or {})
+        rows = [
+            [stage, f"{value:.2f}", *(f"{amount / max(value, 1e-3):.3g}" for _, amount in amounts)]
+            for stage, value in seconds.items()
+        ]
+        print(table(["stage", "seconds", *(name for name, _ in amounts)], rows), file=sys.stderr)
 
     @contextmanager
     def progress(self, label: str) -> Iterator[Progress]:
@@ -84,6 +91,15 @@ class Talk:
 
     def _show_warning(self, message: Warning | str, *_: Any, **__: Any) -> None:
         self.warn(str(message))
+
+
+def _amounts(run: Mapping[str, Any]) -> list[tuple[str, float]]:
+    """Return what a run had to get through: names of rates, and millions of bytes and points."""
+    if "inputs" not in run:
+        return []
+    megabytes = sum(file["bytes"] for file in run["inputs"]) / 1e6
+    points = sum(lidar["points"] for lidar in run["capture"]["streams"]) / 1e6
+    return [("MB/s", megabytes), ("million points/s", points)]
 
 
 class Progress:

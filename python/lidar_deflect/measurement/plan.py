@@ -36,6 +36,8 @@ INBOARD_SHARE = 0.12
 """Added towards the root: a bent blade draws nearer, and a lidar sees more of one far away."""
 LOADED_SHARE = 0.4
 """Room along the load where no prediction says how far, as a share of the length."""
+SWING_SHARE = 0.06
+"""Room on all sides for the swing of a fatigue test, as a share of the length."""
 PREDICTION_MARGIN = 1.25
 WALL_MARGIN_M = 1.0
 MIN_BLADE_POINTS = 100
@@ -157,6 +159,10 @@ def _box(config: Config, blade: Floats) -> Floats:
     high[:2] += SIDE_SHARE * length
     low[2] -= INBOARD_SHARE * length
     high[2] = length + MARGIN_M
+    if config.test.kind == "fatigue":  # it swings to both sides, across and up
+        low[:2] -= SWING_SHARE * length
+        high[:2] += SWING_SHARE * length
+        return _before_walls(config, np.stack([low, high]))
     reach = _reach_m(config)
     if config.load.direction is None:  # x is the horizontal load direction, its sense is open
         low[0], high[0] = low[0] - reach, high[0] + reach

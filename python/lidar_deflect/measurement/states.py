@@ -25,6 +25,45 @@ def joined_names(lidars: Sequence[str], used: NDArray[np.bool_]) -> NDArray[np.o
 
 
 @dataclass(frozen=True)
+class Check:
+    """One question that a run asks of itself.
+
+    Attributes
+    ----------
+    name
+        What was looked at.
+    value, limit
+        What was found and how far it may go, as text with units.
+    passed
+        Whether it holds.
+    where
+        Hold, lidar, span or time of what was found; empty where it is of all.
+    only_warns
+        Whether a failure is a warning and no contradiction.
+    """
+
+    name: str
+    value: str
+    limit: str
+    passed: bool
+    where: str = ""
+    only_warns: bool = False
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        at = f" ({self.where})" if self.where else ""
+        return f"self-check: {self.name}{at}: {self.value}, the limit is {self.limit}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Entry of ``self_check`` in run.json."""
+        place = {"where": self.where} if self.where else {}
+        kind = {"only_warns": True} if self.only_warns else {}
+        found = {"name": self.name, "value": self.value, **place, "limit": self.limit}
+        return {**found, "passed": self.passed, **kind}
+
+
+@dataclass(frozen=True)
 class States:
     """Positions of material sections over time, world frame, metres.
 
@@ -55,6 +94,12 @@ class States:
         What was decided on the way, for run.json.
     warnings
         Sentences for the user.
+    outline
+        Columns of the table of this name, without ``t_s``; empty under a method that has none.
+    checks
+        What the run asked of itself.
+    budget
+        What the uncertainty of every section in every hold is made of, for run.json.
     failed
         Where the data contradict the method's model: sentences; the run exits with 6.
     """
@@ -80,6 +125,9 @@ class States:
     evidence: Mapping[str, Any] = field(default_factory=dict)
     warnings: Sequence[str] = ()
     failed: Sequence[str] = ()
+    outline: Mapping[str, Any] = field(default_factory=dict)
+    checks: Sequence[Check] = ()
+    budget: Sequence[Mapping[str, Any]] = ()
 
     @property
     def deflection_m(self) -> Floats:

@@ -2,12 +2,23 @@
 
 `Plots` holds a result and draws: `series` over time, `load` over the load, `shapes` in space,
 `spans` along the blade, `places` of the yard, `quality` of the comparison and of the lidars,
+`surface` of section cuts and residuals,
 `fatigue` over cycles; `style` is how all of them look.
 """
 
 import plotly.graph_objects as go
 
-from lidar_deflect.plots import fatigue, load, places, quality, series, shapes, spans, style
+from lidar_deflect.plots import (
+    fatigue,
+    load,
+    places,
+    quality,
+    series,
+    shapes,
+    spans,
+    style,
+    surface,
+)
 from lidar_deflect.plots.series import Quantity
 from lidar_deflect.plots.source import HasTables
 
@@ -95,6 +106,22 @@ class Plots:
     def residuals(self) -> go.Figure:
         """Draw how far the blade's points lie from the model, by lidar along the span."""
         return quality.residuals(self._result)
+
+    def residual_map(self) -> go.Figure:
+        """Draw the mean residual over span and chord, suction and pressure side."""
+        return surface.residual_map(self._result)
+
+    def section_cut(self, section: str | float | None = None, step: str | None = None) -> go.Figure:
+        """Draw a section across its axis: outline, its 95 % band, points within 0.3 m.
+
+        Parameters
+        ----------
+        section
+            Name, arc length in metres, or None and ``tip`` for the outermost.
+        step
+            Load step; default: the last.
+        """
+        return surface.section_cut(self._result, section, step)
 
     def cycles(self, section: str | float | None = None) -> go.Figure:
         """Draw amplitudes and frequency of one section over the cycles of a fatigue test."""

@@ -70,8 +70,8 @@ def _turns(line: pl.DataFrame) -> tuple[np.ndarray, np.ndarray]:
 def _add_step(figure: go.Figure, line: pl.DataFrame, rows: pl.DataFrame, step: str, k: int) -> None:
     label = style.text(step)
     for row, (name, _, factor) in enumerate(_PANELS, start=1):
-        if name == "twist_deg" and line["utwist_deg"].null_count() == 0:
-            figure.add_trace(_band(line, k, label), row=row, col=1)
+        if line[f"u{name}"].null_count() == 0:
+            figure.add_trace(_band(line, name, factor, k, label), row=row, col=1)
         figure.add_trace(
             go.Scatter(
                 x=line["s_m"],
@@ -89,8 +89,10 @@ def _add_step(figure: go.Figure, line: pl.DataFrame, rows: pl.DataFrame, step: s
     figure.add_trace(_sections(rows, k, label), row=3, col=1)
 
 
-def _band(line: pl.DataFrame, k: int, label: str) -> go.Scatter:
-    low, high = (line["twist_deg"] + f * style.COVERAGE * line["utwist_deg"] for f in (-1.0, 1.0))
+def _band(line: pl.DataFrame, name: str, factor: float, k: int, label: str) -> go.Scatter:
+    """Draw the 95 % interval of a column along the span."""
+    ends = (-style.COVERAGE, style.COVERAGE)
+    low, high = (factor * (line[name] + end * line[f"u{name}"]) for end in ends)
     return go.Scatter(
         x=pl.concat([line["s_m"], line["s_m"].reverse()]),
         y=pl.concat([high, low.reverse()]),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from lidar_deflect import words
 from lidar_deflect.report import (
     against,
+    budget,
     checks,
     curves,
     digits,
@@ -19,15 +20,12 @@ from lidar_deflect.report import (
 from lidar_deflect.report.checks import flat, label
 from lidar_deflect.report.document import (
     Block,
-    Cell,
     Chapter,
     Code,
-    Column,
     Document,
     Facts,
     Fold,
     Heading,
-    Table,
     Text,
 )
 
@@ -81,7 +79,7 @@ def _method(folder: Folder) -> tuple[Block, ...]:
     known = words.METHODS.get(name) or (words.METHOD_UNKNOWN.format(method=name),)
     found: list[Block] = [Text(known), Heading(words.BUDGET_HEADING)]
     found += [Text(words.BUDGET[name])] if name in words.BUDGET else []
-    table = _budget(folder)
+    table = budget.table(folder)
     found += [table] if table is not None else []
     found += [Text((words.NOT_CLAIMED,)), Text(words.DEFINITIONS, quiet=True)]
     given = folder.run.get("evidence") or {}
@@ -89,31 +87,6 @@ def _method(folder: Folder) -> tuple[Block, ...]:
         pairs = tuple((label(str(k)), flat(v)) for k, v in given.items())
         found.append(Fold(words.EVIDENCE, (Facts(pairs),)))
     return tuple(found)
-
-
-def _budget(folder: Folder) -> Table | None:
-    """Return ``budget`` of run.json: a list of contributions with the columns that they have."""
-    given = folder.run.get("budget") or folder.run.get("uncertainty_budget") or ()
-    if isinstance(given, Mapping):
-        given = [
-            {"contribution": k, **(v if isinstance(v, Mapping) else {"u": v})}
-            for k, v in given.items()
-        ]
-    rows = [each for each in given if isinstance(each, Mapping)]
-    if not rows:
-        return None
-    names = list(dict.fromkeys(str(name) for row in rows for name in row))
-    cells = tuple(tuple(_cell(row.get(name)) for name in names) for row in rows)
-    columns = tuple(
-        Column(label(name), numeric=isinstance(rows[0].get(name), int | float)) for name in names
-    )
-    return Table("budget", words.BUDGET_CAPTION, columns, (cells,))
-
-
-def _cell(value: Any) -> Cell:
-    if isinstance(value, float):
-        return Cell(f"{value:.3g}", value)
-    return Cell(digits.NONE if value is None else flat(value), flat(value))
 
 
 def _configuration(folder: Folder) -> tuple[Block, ...]:

@@ -34,6 +34,7 @@ class Check:
     found: str
     limit: str
     passed: bool | None
+    only_warns: bool = False
 
 
 def all_checks(folder: Folder) -> list[Check]:
@@ -44,23 +45,25 @@ def all_checks(folder: Folder) -> list[Check]:
 
 def has_failed(folder: Folder) -> bool:
     """Tell whether any check failed."""
-    return any(each.passed is False for each in all_checks(folder))
+    return any(each.passed is False and not each.only_warns for each in all_checks(folder))
 
 
 def check_table(folder: Folder) -> Table:
     """Return the checks as a table."""
     rows = tuple(
-        (said(each.name), said(each.found), said(each.limit), _result(each.passed))
+        (said(each.name), said(each.found), said(each.limit), _result(each))
         for each in all_checks(folder)
     )
     columns = tuple(Column(label, numeric=False) for label in words.CHECKS_COLUMNS.values())
     return Table("self_check", words.CHECKS_CAPTION, columns, (rows,))
 
 
-def _result(passed: bool | None) -> Cell:
-    if passed is None:
+def _result(check: Check) -> Cell:
+    if check.passed is None:
         return said(words.UNKNOWN)
-    return said(words.PASSED, "good") if passed else said(words.FAILED, "bad")
+    if check.only_warns and not check.passed:
+        return said(words.WARNS, "warn")
+    return said(words.PASSED, "good") if check.passed else said(words.FAILED, "bad")
 
 
 def _of_run(folder: Folder) -> Iterator[Check]:
@@ -76,10 +79,13 @@ def _one_of_run(key: str, entry: Any) -> Check:
         return Check(key.replace("_", " "), flat(entry), digits.NONE, _truth(entry))
     name = str(entry.get("name") or entry.get("check") or key).replace("_", " ")
     passed = next((entry[k] for k in ("passed", "ok", "pass") if k in entry), None)
-    skipped = {"name", "check", "passed", "ok", "pass", "limit"}
+    skipped = {"name", "check", "passed", "ok", "pass", "limit", "where", "only_warns"}
     facts = {k: v for k, v in entry.items() if k not in skipped}
     shown = flat(facts["value"]) if set(facts) == {"value"} else flat(facts)
-    return Check(name, shown, flat(entry.get("limit")), _truth(passed))
+    if entry.get("where"):
+        shown = f"{shown} ({flat(entry['where'])})"
+    only_warns = entry.get("only_warns") is True
+    return Check(name, shown, flat(entry.get("limit")), _truth(passed), only_warns)
 
 
 def _truth(value: Any) -> bool | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from lidar_deflect import behaviour, words
+from lidar_deflect.comparison import largest_step
 from lidar_deflect.plots import Plots
 from lidar_deflect.plots.series import other_names, wire_names
 from lidar_deflect.plots.source import sections, some
@@ -14,6 +15,8 @@ from lidar_deflect.report.document import Block, Cell, Column, Figure, Fold, Rep
 from lidar_deflect.report.document import words as said
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from lidar_deflect.folder import Folder
 
 _SHOWN = 6
@@ -140,7 +143,18 @@ def shapes(folder: Folder) -> tuple[Block, ...]:
         found.append(Figure("deflected_shapes", caption, plots.deflected_shapes()))
     if has_rotations(folder) and folder.steps.height:
         found.append(Figure("rotation", words.CAPTIONS["rotation"], plots.rotation()))
-    return tuple(found) or (Text((words.NO_LOADED,)),)
+    return (*found, *_cuts(folder)) or (Text((words.NO_LOADED,)),)
+
+
+def _cuts(folder: Folder) -> Iterator[Figure]:
+    """Sections across their axes, at the step with most load."""
+    if folder.outline.is_empty():
+        return
+    step = largest_step(folder.steps)
+    for name, s_m in some(list(reversed(sections(folder.outline))), _SHOWN):
+        figure = Plots(folder).section_cut(name, step)
+        caption = words.CAPTIONS["section_cut"].format(section=name, s_m=s_m, step=step)
+        yield Figure(f"section_cut_{name}", caption, figure)
 
 
 def cycles(folder: Folder) -> tuple[Block, ...]:

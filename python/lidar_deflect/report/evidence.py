@@ -52,6 +52,8 @@ def calibration(folder: Folder) -> tuple[Block, ...]:
         found.append(Figure("drift", words.CAPTIONS["drift"], plots.drift(), link="time"))
     if folder.points["residual_m"].null_count() < folder.points.height:
         found.append(Figure("residuals", words.CAPTIONS["residuals"], plots.residuals()))
+    if folder.points["chord"].null_count() < folder.points.height:
+        found.append(Figure("residual_map", words.CAPTIONS["residual_map"], plots.residual_map()))
     return tuple(found)
 
 

@@ -93,8 +93,10 @@ CONTOUR = Table(
         SECTION[1],
         *_xyz("{}_m", "mid-chord point in the world frame"),
         *_xyz("u{}_m", "standard uncertainty (k = 1) of the position"),
-        Column("rx_rad", F64, "rad", "rotation of the section about world x", True),
-        Column("ry_rad", F64, "rad", "rotation of the section about world y", True),
+        Column("rx_rad", F64, "rad", "rotation about world x since the unloaded hold", True),
+        Column("ry_rad", F64, "rad", "rotation about world y since the unloaded hold", True),
+        Column("urx_rad", F64, "rad", "standard uncertainty (k = 1) of rx_rad", True),
+        Column("ury_rad", F64, "rad", "standard uncertainty (k = 1) of ry_rad", True),
         Column("twist_deg", F64, "deg", "twist change", True),
         Column("utwist_deg", F64, "deg", "standard uncertainty (k = 1) of the twist change", True),
         STATUS_COLUMN,
@@ -110,6 +112,35 @@ POINTS = Table(
         *_xyz("{}_m", "point in the world frame", nullable=False),
         _metres("s_m", "arc length of the nearest station"),
         _metres("residual_m", "signed distance to the model"),
+        Column(
+            "chord",
+            F64,
+            "ratio",
+            "chord fraction where its ray meets the model, from the leading edge; below 0 on the "
+            "pressure side",
+            True,
+        ),
+    ),
+)
+OUTLINE = Table(
+    "outline",
+    "load step, section and point of its outline: the surface as the adjustment has it",
+    (
+        *TIME,
+        Column("step", STR, "name", "load step"),
+        *SECTION,
+        Column(
+            "place",
+            U32,
+            "index",
+            "from the leading edge over the suction side to the trailing edge and back",
+        ),
+        *_xyz(
+            "{}_m",
+            "point of the surface in the world frame, averaged over the hold",
+            nullable=False,
+        ),
+        Column("u_m", F64, "m", "standard uncertainty (k = 1) along the normal"),
     ),
 )
 REJECTED = Table(
@@ -234,6 +265,7 @@ SCHEMAS: Mapping[str, Table] = MappingProxyType(
             STEPS,
             CONTOUR,
             POINTS,
+            OUTLINE,
             REJECTED,
             HEALTH,
             POSES,

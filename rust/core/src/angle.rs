@@ -23,6 +23,20 @@ pub struct Arc {
     pub width_rad: f64,
 }
 
+impl Arc {
+    /// The smallest arc that holds all angles, where they lie within less than half a turn.
+    pub fn around(angles_rad: &[f64]) -> Option<Self> {
+        let first = *angles_rad.first()?;
+        let aside = |angle: &f64| wrap_half_turn(angle - first);
+        let ends = |pick: fn(f64, f64) -> f64| angles_rad.iter().map(aside).fold(0.0, pick);
+        let (low, high) = (ends(f64::min), ends(f64::max));
+        (high - low < PI).then(|| Self {
+            from_rad: wrap_turn(first + low),
+            width_rad: high - low,
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -32,6 +46,14 @@ mod tests {
         assert_eq!(wrap_turn(TAU), 0.0);
         assert_eq!(wrap_turn(-1e-18), 0.0);
         assert!((wrap_turn(-0.1) - (TAU - 0.1)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn an_arc_around_angles_may_lie_over_the_seam() {
+        let arc = Arc::around(&[0.2, TAU - 0.1, 0.05]).unwrap();
+        assert!((arc.from_rad - (TAU - 0.1)).abs() < 1e-12 && (arc.width_rad - 0.3).abs() < 1e-12);
+        assert_eq!(Arc::around(&[0.0, 2.0, 4.0]), None);
+        assert_eq!(Arc::around(&[]), None);
     }
 
     #[test]

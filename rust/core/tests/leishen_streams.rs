@@ -7,7 +7,7 @@ use leishen::*;
 use lidar_deflect_core::packet::leishen::cx::Cx;
 use lidar_deflect_core::packet::leishen::mirror::{self, MIRRORS};
 use lidar_deflect_core::packet::leishen::products::{self, PRODUCTS};
-use lidar_deflect_core::packet::leishen::{cx, difop};
+use lidar_deflect_core::packet::leishen::{ch, cx, difop};
 use lidar_deflect_core::packet::unit::{Calibration, UnitFile};
 use lidar_deflect_core::packet::{MODELS, Model, PacketKind, ReturnMode, closest};
 
@@ -178,5 +178,31 @@ fn mirrors_are_told_by_length_and_lines_and_say_so() {
             "{:?}",
             info.notes
         );
+    }
+}
+
+#[test]
+fn the_two_mirrors_that_are_not_decoded_are_refused_by_name() {
+    let packet = |lines: usize, step: usize| ch::RawPacket {
+        time_ns: START_NS,
+        is_double: false,
+        is_ptp: false,
+        records: (0..171_usize)
+            .map(|number| {
+                Some(ch::Record {
+                    line: (number % lines) as u8,
+                    azimuth: (number * step) as u16,
+                    echoes: [(256_000, 9), (0, 0)],
+                })
+            })
+            .collect(),
+    };
+    let wide = mirror::MODELS[1].encode(&packet(64, 105));
+    let one_line = mirror::MODELS[6].encode(&packet(1, 60));
+    for (payload, name) in [(wide, "CH64W"), (one_line, "CX1S3")] {
+        let claims = MODELS.iter().filter_map(|model| model.recognise(&payload));
+        assert_eq!(claims.count(), 0, "{name}");
+        let near = closest(&payload).unwrap();
+        assert!(near.why.contains(name) && near.may_be.is_none(), "{near:?}");
     }
 }

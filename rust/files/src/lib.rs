@@ -1,5 +1,6 @@
 //! Opens captures for `lidar-deflect-core`: paths, compression, rotated and parallel files.
 
+mod ahead;
 mod container;
 mod error;
 mod gzip;

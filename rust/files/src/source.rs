@@ -4,6 +4,7 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, Chain, Cursor, ErrorKind, Read};
 use std::path::Path;
 
+use crate::ahead::{Ahead, Packed};
 use crate::container::{Container, HEAD_LEN, recognise};
 use crate::error::FileError;
 use crate::gzip::GzipMembers;
@@ -28,8 +29,19 @@ impl Read for Counted {
 
 enum Unpacked {
     Plain(Counted),
-    Gzip(Box<GzipMembers<BufReader<Counted>>>),
-    Zstd(Box<zstd::Decoder<'static, BufReader<Counted>>>),
+    Compressed(Ahead),
+}
+
+impl Packed for GzipMembers<BufReader<Counted>> {
+    fn packed_bytes(&self) -> u64 {
+        self.get_ref().map_or(0, |reader| reader.get_ref().count)
+    }
+}
+
+impl Packed for zstd::Decoder<'static, BufReader<Counted>> {
+    fn packed_bytes(&self) -> u64 {
+        self.get_ref().get_ref().count
+    }
 }
 
 /// A capture file, decompressed on the way.
@@ -64,27 +76,26 @@ impl Source {
     pub(crate) fn bytes_read(&self) -> u64 {
         match &self.0 {
             Unpacked::Plain(bytes) => bytes.count,
-            Unpacked::Gzip(gzip) => gzip.get_ref().map_or(0, |reader| reader.get_ref().count),
-            Unpacked::Zstd(zstd) => zstd.get_ref().get_ref().count,
+            Unpacked::Compressed(ahead) => ahead.packed_bytes(),
         }
     }
 }
 
 fn unpack(container: Container, bytes: Counted) -> io::Result<Unpacked> {
     let buffered = |bytes| BufReader::with_capacity(BUFFER_LEN, bytes);
-    Ok(match container {
-        Container::Plain => Unpacked::Plain(bytes),
-        Container::Gzip => Unpacked::Gzip(Box::new(GzipMembers::new(buffered(bytes)))),
-        Container::Zstd => Unpacked::Zstd(Box::new(zstd::Decoder::with_buffer(buffered(bytes))?)),
-    })
+    let reader: Box<dyn Packed> = match container {
+        Container::Plain => return Ok(Unpacked::Plain(bytes)),
+        Container::Gzip => Box::new(GzipMembers::new(buffered(bytes))),
+        Container::Zstd => Box::new(zstd::Decoder::with_buffer(buffered(bytes))?),
+    };
+    Ok(Unpacked::Compressed(Ahead::new(reader)))
 }
 
 impl Read for Source {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
         match &mut self.0 {
             Unpacked::Plain(bytes) => bytes.read(into),
-            Unpacked::Gzip(gzip) => gzip.read(into),
-            Unpacked::Zstd(zstd) => zstd.read(into),
+            Unpacked::Compressed(ahead) => ahead.read(into),
         }
     }
 }

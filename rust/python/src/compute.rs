@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use pyo3::prelude::*;
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::error::BorderResult;
 use lidar_deflect_core::error::InvalidValue;
@@ -21,14 +21,7 @@ pub fn compute<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,
 ) -> BorderResult<T> {
-    let pool = ThreadPoolBuilder::new()
-        .num_threads(checked_threads(threads)?)
-        .build();
-    let pool = pool.map_err(|error| InvalidValue {
-        name: "threads",
-        expected: "a number of threads that the system can start".into(),
-        found: error.to_string(),
-    })?;
+    let pool = pool_of(threads)?;
     let result = py.detach(|| pool.install(work));
     py.check_signals()?;
     Ok(result)
@@ -55,6 +48,27 @@ pub fn interruptible<T: Send>(
     });
     signal?;
     Ok(result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+}
+
+/// As [`compute`], for work that looks at the flag of [`interruptible`] now and then.
+pub fn compute_until<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> BorderResult<T> {
+    let pool = pool_of(threads)?;
+    interruptible(py, |stop| pool.install(|| work(stop)))
+}
+
+fn pool_of(threads: Option<usize>) -> BorderResult<ThreadPool> {
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(checked_threads(threads)?)
+        .build();
+    Ok(pool.map_err(|error| InvalidValue {
+        name: "threads",
+        expected: "a number of threads that the system can start".into(),
+        found: error.to_string(),
+    })?)
 }
 
 fn checked_threads(threads: Option<usize>) -> Result<usize, InvalidValue> {

@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.errors import MeasurementError
+from lidar_deflect.measurement.beam import rotation
 from lidar_deflect.measurement.beam.adjustment import LAST, Solved, solve
-from lidar_deflect.measurement.beam.check import contradictions, objects
+from lidar_deflect.measurement.beam.budget import budget_of
+from lidar_deflect.measurement.beam.check import checks, loose_edges, objects
 from lidar_deflect.measurement.beam.expected import expected_of
 from lidar_deflect.measurement.beam.following import Followed, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
+from lidar_deflect.measurement.beam.outline import outline_of
+from lidar_deflect.measurement.beam.swung import widened
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
 from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States, joined_names
 
@@ -55,14 +59,29 @@ def measure(inputs: Inputs) -> States:
     names, sections = zip(*((x.name, x.s_m) for x in inputs.config.sections), strict=True)
     stations = _stations(inputs)
     s_m = np.array([*sections, *stations])
-    followed = follow(inputs, expected, solved, s_m, times_ns)
-    covariance = HoldCovariance.of(solved, s_m, LAST)
-    reference, spread = _reference(inputs, s_m, followed, times_ns, covariance)
+    holds = HoldCovariance.of(solved, s_m, LAST)
+    followed = follow(inputs, expected, solved, times_ns, (len(sections), len(stations)))
+    reference, kept_m2 = _reference(inputs, s_m, followed, times_ns, solved, holds)
     moved = followed.values[..., :3] - reference
-    uncertainty = over_time(covariance, spread, solved, expected, followed, times_ns, moved)
+    uncertainty = over_time(followed.spreads, kept_m2, moved)
+    if expected.swings:
+        uncertainty = widened(uncertainty, holds, moved)
     of = slice(0, len(sections))
     status, reason = _grades(followed)
+    asked = checks(inputs, solved, s_m, holds)
     every = max(1, round(inputs.rate_hz))
+    line = slice(len(sections), None)
+    turned = np.concatenate(
+        [
+            rotation.rotations_rad(s_m[line], followed.values[:, line, :3], reference[line]),
+            rotation.over_time(
+                rotation.variance_rad2(s_m[line], holds, line),
+                np.array(solved.shares),
+                expected.at(times_ns),
+            ),
+        ],
+        axis=2,
+    )
     return States(
         time_ns=times_ns,
         names=names,
@@ -78,7 +97,7 @@ def measure(inputs: Inputs) -> States:
         status=np.repeat(status[:, None], len(sections), axis=1),
         reason=np.repeat(reason[:, None], len(sections), axis=1),
         blade_points=followed.used,
-        contour=_contour(times_ns, stations, followed, uncertainty, len(sections), every),
+        contour=_contour(times_ns, stations, followed, uncertainty, turned, every),
         points=_points(inputs, followed),
         rejected=objects(solved),
         u_position_m=uncertainty.position_m[:, of],
@@ -87,8 +106,15 @@ def measure(inputs: Inputs) -> States:
         twist_deg=np.degrees(followed.values[:, of, 3]),
         u_twist_deg=np.degrees(uncertainty.twist_rad[:, of]),
         evidence=_evidence(expected, solved),
-        warnings=_warnings(solved),
-        failed=contradictions(inputs, solved),
+        warnings=[
+            *_warnings(solved),
+            *loose_edges(inputs, solved),
+            *(c.text for c in asked if not c.passed and c.only_warns),
+        ],
+        failed=[c.text for c in asked if not c.passed and not c.only_warns],
+        outline=outline_of(solved, names, s_m[of]),
+        checks=asked,
+        budget=budget_of(solved, names, s_m[of]),
     )
 
 
@@ -102,32 +128,35 @@ def _reference(
     s_m: Floats,
     followed: Followed,
     times_ns: NDArray[np.int64],
-    covariance: HoldCovariance,
-) -> tuple[Floats, Floats]:
-    """Unloaded position of every section (s, 3), and covariance of the deflection in each hold.
+    solved: Solved,
+    holds: HoldCovariance,
+) -> tuple[Floats, Floats | None]:
+    """Unloaded position of every section (s, 3); its covariance (s, 3, 3) where it is a kept one.
 
-    The position is the mean of the unloaded hold's states, else that of the calibration.
+    The position is the mean of the unloaded hold's states, as the table of steps has it, else that
+    of the calibration.
     """
     if inputs.unloaded_ns is None:
-        return _kept_reference(inputs, s_m, covariance)
-    inside = (times_ns >= inputs.unloaded_ns[0]) & (times_ns <= inputs.unloaded_ns[1])
+        return _kept_reference(inputs, s_m)
+    # A blade that sways slowly has another mean over any other stretch of time.
+    hold, (start_ns, stop_ns) = solved.holds[0], inputs.unloaded_ns
+    if hold.from_ns < stop_ns and hold.to_ns > start_ns:
+        start_ns, stop_ns = max(start_ns, hold.from_ns), min(stop_ns, hold.to_ns)
+    inside = (times_ns >= start_ns) & (times_ns <= stop_ns)
     states = followed.values[inside, :, :3]
     known = ~np.isnan(states).any(axis=(1, 2))
-    position = states[known].mean(axis=0) if known.any() else covariance.values[0, :, :3]
-    return np.asarray(position), covariance.deflection_covariance()
+    position = states[known].mean(axis=0) if known.any() else holds.values[0, :, :3]
+    return np.asarray(position), None
 
 
-def _kept_reference(
-    inputs: Inputs, s_m: Floats, covariance: HoldCovariance
-) -> tuple[Floats, Floats]:
+def _kept_reference(inputs: Inputs, s_m: Floats) -> tuple[Floats, Floats]:
     if "beam" not in inputs.calibration.reference:
         raise MeasurementError(
             "neither these captures nor the calibration have the unloaded blade",
             code="measurement.no_reference",
             hint='calibrate from a capture with an unloaded hold, with method = "beam"',
         )
-    position, own = Kept.from_dict(inputs.calibration.reference["beam"]).at(s_m)
-    return position, covariance.position_covariance() + own
+    return Kept.from_dict(inputs.calibration.reference["beam"]).at(s_m)
 
 
 def _stations(inputs: Inputs) -> list[float]:
@@ -156,10 +185,11 @@ def _contour(
     stations: list[float],
     followed: Followed,
     uncertainty: Any,
-    first: int,
+    turned: Floats,
     every: int,
 ) -> Mapping[str, Any]:
-    """Blade line once a second."""
+    """Blade line once a second; `turned` are rotations about x and y and their uncertainties."""
+    first = followed.values.shape[1] - len(stations)
     known = np.flatnonzero(~np.isnan(followed.values).any(axis=(1, 2)))[::every]
     values = followed.values[known, first:].reshape(-1, 4)
     sigma = uncertainty.position_m[known, first:].reshape(-1, 3)
@@ -168,6 +198,10 @@ def _contour(
         "s_m": np.tile(stations, len(known)),
         **{f"{axis}_m": values[:, i] for i, axis in enumerate("xyz")},
         **{f"u{axis}_m": sigma[:, i] for i, axis in enumerate("xyz")},
+        **{
+            name: turned[known, :, i].ravel()
+            for i, name in enumerate(("rx_rad", "ry_rad", "urx_rad", "ury_rad"))
+        },
         "twist_deg": np.degrees(values[:, 3]),
         "utwist_deg": np.degrees(uncertainty.twist_rad[known, first:].ravel()),
         "status": ["ok"] * len(values),
@@ -183,6 +217,7 @@ def _points(inputs: Inputs, followed: Followed) -> Mapping[str, Any]:
         "lidar": [inputs.lidars[number] for number in points["lidar"][order]],
         "ring": points["ring"][order],
         "s_m": points["s_m"][order],
+        "chord": points["chord"][order],
         "residual_m": points["residual_m"][order],
         **{f"{axis}_m": points["xyz_m"][order, i] for i, axis in enumerate("xyz")},
     }
@@ -208,6 +243,7 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
         "steps": solved.steps,
         "largest_last_change": solved.told["largest"],
         "noise_m": list(solved.told["noise_m"]),
+        "surface_m": solved.told["surface_m"],
         "holds": holds,
     }
 

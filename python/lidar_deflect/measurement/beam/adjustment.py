@@ -37,16 +37,26 @@ SEEN_SHARE = 0.45
 ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
 
-LOADS = ((3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
-BLADE = ((1.0, 1.0), (1.0, 1.0), (0.6, 0.6), (0.6, 0.6), (0.3, 0.4), (0.3, 0.4), (0.2, 0.2))
-ALL = ((0.1, 0.1), *((0.05, 0.05),) * 3)
-"""Gates of echoes along and of edges across the ray, metres, while the blade is being found."""
-FAR = ((6.0, 5.0), (6.0, 5.0), (4.0, 3.0))
-"""The same before them where no drawing tells the prebend."""
+Stages = tuple[tuple[float, float, str], ...]
+
+
+def _stage(name: str, *gates_m: tuple[float, float]) -> Stages:
+    return tuple((echo_m, edge_m, name) for echo_m, edge_m in gates_m)
+
+
 LAST = (0.05, 0.05)
+LOADS = _stage("loads", (3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
+BLADE = _stage("blade", *[(1.0, 1.0)] * 2, *[(0.6, 0.6)] * 2, *[(0.3, 0.4)] * 2, (0.2, 0.2))
+DRAWN = (*LOADS, *BLADE, *_stage("all", (0.1, 0.1), *[LAST] * 3))
+"""Gates of echoes along and of edges across the ray, metres, and what may change, step by step."""
+FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
+SURFACE = _stage("all", *[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8)
+UNDRAWN = (*FAR, *LOADS, *SURFACE)
+"""The same where no drawing tells the prebend and the surface: what bends would bend to fit it."""
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
 MAX_LAST = 12
+MAX_LAST_UNDRAWN = 40
 
 NOISE_M, SURFACE_M, EDGE_RAD = 0.015, 0.002, 1e-4
 
@@ -187,20 +197,15 @@ def _settle(
     native: _native.BeamAdjustment, inputs: Inputs, *, is_far: bool
 ) -> tuple[Mapping[str, Any], int]:
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
-    loads = (*FAR, *LOADS) if is_far else LOADS
-    schedule = [*((*gate, "loads") for gate in loads), *((*gate, "blade") for gate in BLADE)]
-    schedule += [(*gate, "all") for gate in ALL]
+    schedule = UNDRAWN if is_far else DRAWN
     listener = inputs.listener("adjust")
-    total = len(schedule) + MAX_LAST
-    for place, (echo_m, edge_m, stage) in enumerate(schedule):
-        told = native.step(echo_m, edge_m, stage)
+    total = len(schedule) + (MAX_LAST_UNDRAWN if is_far else MAX_LAST)
+    told: dict[str, Any] = {"largest": np.inf}
+    steps = 0
+    while steps < len(schedule) or (told["largest"] > SETTLED and steps < total):
+        told = native.step(*(schedule[steps] if steps < len(schedule) else (*LAST, "all")))
         with suppress(MeasurementError):  # a step too far is brought back by the next ones
             native.linearise()
-        if listener:
-            listener(place + 1, total)
-    steps = len(schedule)
-    while told["largest"] > SETTLED and steps < total:
-        told = native.step(*LAST, "all")
         steps += 1
         if listener:
             listener(steps, total)

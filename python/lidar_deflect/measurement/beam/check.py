@@ -6,59 +6,220 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+from lidar_deflect.measurement.beam import whiteness
+from lidar_deflect.measurement.beam.adjustment import LAST
+from lidar_deflect.measurement.beam.drawing import saddles_m
+from lidar_deflect.measurement.beam.pulls import pulls
+from lidar_deflect.measurement.states import Check
 
-    from lidar_deflect.holds import Hold
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
+    from numpy.typing import NDArray
+
     from lidar_deflect.measurement.beam.adjustment import Solved
+    from lidar_deflect.measurement.beam.uncertainty import HoldCovariance
     from lidar_deflect.measurement.inputs import Inputs
+
+    Floats = NDArray[np.float64]
 
 NOISE_M = 0.03
 """Residuals of a lidar beyond this contradict the model: sensors are less noisy."""
+CHI_SQUARE = 2.0
+"""Mean square of a lidar's residuals in its own deviations; beyond it tails are not noise."""
 EDGE_STEPS = 0.6
 """Edges that scatter by more steps between shots than this are not those of the blade."""
+EDGES_LOST = 0.4
+"""More of the hard edges than this share lie beyond the gate: the silhouette is another one."""
+EDGE_DEVIATIONS, EDGE_MEAN_STEPS = 5.0, 0.2
+"""A group of edges beyond both, deviations of its mean and steps, is not the silhouette."""
 MEAN_M = 0.006
 """Mean residual of a lidar in a hold beyond this contradicts the model."""
 COUNTED = 0.5
 """Fewer of the echoes that meet the model than this share count: the blade lies elsewhere."""
 SETTLED = 0.5
 """A last step of more than this share of a prior deviation has not settled."""
+STRAIN, STRAIN_DEVIATIONS = 5e-4, 3.0
+"""A free axial strain beyond both contradicts a blade that keeps its length."""
+TURN_BACK_RAD = 2e-3
+"""The blade may bend back by so little outboard of the last load."""
 OBJECT_M = 1.0
 """Rejected echoes are gathered to objects by so much of the span."""
 MIN_ECHOES = 30
+MIN_EDGES = 12
+SIDES = ("leading edge", "trailing edge")
 
 
-def contradictions(inputs: Inputs, solved: Solved) -> list[str]:
-    """Say where the data contradict the model, a sentence each; none where they agree."""
-    found = []
-    if solved.told["largest"] > SETTLED:
-        found.append(
-            f"the adjustment did not settle: its last step was {solved.told['largest']:.2f} of a "
-            "prior deviation"
-        )
-    lidars = [inputs.lidars[place] for place in inputs.stands]
-    for lidar, noise_m in zip(lidars, solved.told["noise_m"], strict=True):
-        if noise_m > NOISE_M:
-            found.append(f"lidar {lidar}: residuals scatter by {1e3 * noise_m:.0f} mm")
+def checks(
+    inputs: Inputs, solved: Solved, s_m: Floats, covariance: HoldCovariance
+) -> tuple[Check, ...]:
+    """Hold the data against the model: one line per question, whatever the answer."""
+    return (
+        _settled(solved),
+        *_counted(solved),
+        *_noise(inputs, solved),
+        *_means(inputs, solved),
+        *_white(solved),
+        *_edges(inputs, solved),
+        *_strain(solved),
+        *_turn(inputs, solved, s_m, covariance),
+        *pulls(*solved.native.posterior(*LAST)),
+    )
+
+
+def _settled(solved: Solved) -> Check:
+    last = float(solved.told["largest"])
+    return Check("adjustment settled", f"last step {last:.3f}", f"{SETTLED:g}", last <= SETTLED)
+
+
+def _counted(solved: Solved) -> Iterator[Check]:
     for hold, told in zip(solved.holds, solved.told["holds"], strict=True):
-        found += _of_hold(inputs, hold, told)
-    return found
+        counted, rejected = len(told["residual_m"]), len(told["rejected"]["s_m"])
+        share = counted / max(counted + rejected, 1)
+        yield Check(
+            "echoes that fit the blade",
+            f"{100.0 * share:.1f} %",
+            f"{100.0 * COUNTED:g} % or more",
+            share >= COUNTED,
+            f"hold {hold.label}",
+        )
 
 
-def _of_hold(inputs: Inputs, hold: Hold, told: Mapping[str, Any]) -> list[str]:
-    counted, rejected = len(told["residual_m"]), len(told["rejected"]["s_m"])
-    name = f"hold {hold.label}"
-    if counted < COUNTED * (counted + rejected) or not counted:
-        return [f"{name}: {rejected} of {counted + rejected} echoes do not fit the blade"]
-    found = []
-    steps = np.array([edge[2] for edge in told["edges"]])
-    if steps.size and float(np.std(steps)) > EDGE_STEPS:
-        found.append(f"{name}: edges scatter by {np.std(steps):.2f} steps between shots")
+def _noise(inputs: Inputs, solved: Solved) -> Iterator[Check]:
+    """Scatter of each lidar, and its mean square in deviations."""
+    stands = [inputs.lidars[place] for place in inputs.stands]
+    for lidar, noise_m in zip(stands, solved.told["noise_m"], strict=True):
+        text = f"{1e3 * noise_m:.1f} mm"
+        yield Check("noise", text, f"{1e3 * NOISE_M:g} mm", noise_m <= NOISE_M, f"lidar {lidar}")
     for number, lidar in enumerate(inputs.lidars):
-        of_lidar = told["residual_m"][told["lidar"] == number]
-        if of_lidar.size > MIN_ECHOES and abs(float(np.median(of_lidar))) > MEAN_M:
-            found.append(f"{name}, lidar {lidar}: residuals are {1e3 * np.median(of_lidar):.1f} mm")
-    return found
+        sigma = float(solved.told["noise_m"][number])
+        of = [t["residual_m"][t["lidar"] == number] for t in solved.told["holds"]]
+        residual = np.concatenate(of)
+        if residual.size > MIN_ECHOES:
+            chi = float(np.mean((residual / sigma) ** 2))
+            where = f"lidar {lidar}"
+            yield Check("chi-square", f"{chi:.2f}", f"{CHI_SQUARE:g}", chi <= CHI_SQUARE, where)
+
+
+def _means(inputs: Inputs, solved: Solved) -> Iterator[Check]:
+    """Median residual of each lidar in the hold where it is largest."""
+    for number, lidar in enumerate(inputs.lidars):
+        found = []
+        for hold, told in zip(solved.holds, solved.told["holds"], strict=True):
+            residual = told["residual_m"][told["lidar"] == number]
+            if residual.size > MIN_ECHOES:
+                found.append((float(np.median(residual)), hold.label))
+        if found:
+            worst, label = max(found, key=lambda pair: abs(pair[0]))
+            yield Check(
+                "mean residual",
+                f"{1e3 * worst:+.1f} mm",
+                f"{1e3 * MEAN_M:g} mm",
+                abs(worst) <= MEAN_M,
+                f"lidar {lidar}, hold {label}",
+            )
+
+
+def _white(solved: Solved) -> Iterator[Check]:
+    noise_m = np.array(solved.told["noise_m"])
+    for hold, span, told in zip(solved.holds, solved.spans_ns, solved.told["holds"], strict=True):
+        yield whiteness.along_span(told, noise_m, f"hold {hold.label}")
+        yield whiteness.along_time(told, noise_m, span, f"hold {hold.label}")
+
+
+def _edges(inputs: Inputs, solved: Solved) -> Iterator[Check]:
+    for hold, told in zip(solved.holds, solved.told["holds"], strict=True):
+        name = f"hold {hold.label}"
+        edges = np.array(told["edges"], dtype=np.float64).reshape(-1, 3)
+        if not len(edges):
+            continue
+        scatter = float(np.std(edges[:, 2]))
+        text = f"{scatter:.2f} steps"
+        yield Check("scatter of edges", text, f"{EDGE_STEPS:g} steps", scatter <= EDGE_STEPS, name)
+        gone = told["edges_left_out"][2]
+        share = gone / (gone + len(edges))
+        text = f"{100.0 * share:.0f} %"
+        limit = f"{100.0 * EDGES_LOST:g} %"
+        yield Check("edges let go", text, limit, share <= EDGES_LOST, name)
+        yield from _group(inputs, edges, name)
+
+
+def _group(inputs: Inputs, edges: Floats, name: str) -> Iterator[Check]:
+    """Find the group of edges, by lidar and side, that lies farthest beside the silhouette."""
+    found = []
+    for number, lidar in enumerate(inputs.lidars):
+        for side, word in enumerate(SIDES):
+            own = edges[(inputs.stands[edges[:, 0].astype(int)] == number) & (edges[:, 1] == side)]
+            if len(own) >= MIN_EDGES:
+                mean, spread = float(np.mean(own[:, 2])), float(np.std(own[:, 2]))
+                off = abs(mean) / max(spread / np.sqrt(len(own)), 1e-9)
+                found.append((off if abs(mean) > EDGE_MEAN_STEPS else 0.0, mean, lidar, word))
+    if found:
+        off, mean, lidar, word = max(found, key=lambda each: (each[0], abs(each[1])))
+        yield Check(
+            "mean of edges",
+            f"{mean:+.2f} steps",
+            f"{EDGE_MEAN_STEPS:g} steps or {EDGE_DEVIATIONS:g} deviations",
+            off <= EDGE_DEVIATIONS,
+            f"{name}, lidar {lidar}, {word}",
+        )
+
+
+def _strain(solved: Solved) -> Iterator[Check]:
+    """Fit a free axial strain beside all else: of the first hold, then of the others against it."""
+    strain, covariance = solved.native.strains(*LAST)
+    for number, hold in enumerate(solved.holds):
+        pick = np.zeros(len(strain))
+        pick[number] = 1.0
+        if number:
+            pick[0] = -1.0
+        value, u = float(pick @ strain), float(pick @ covariance @ pick) ** 0.5
+        limit = max(STRAIN, STRAIN_DEVIATIONS * u)
+        yield Check(
+            "free axial strain" if number else "free axial strain (length of the blade)",
+            f"{1e6 * value:+.0f} +- {1e6 * u:.0f} ppm",
+            f"{1e6 * limit:.0f} ppm",
+            abs(value) <= limit,
+            f"hold {hold.label}",
+        )
+
+
+def _turn(
+    inputs: Inputs, solved: Solved, s_m: Floats, covariance: HoldCovariance
+) -> Iterator[Check]:
+    """Whether the blade bends on in the direction of the load outboard of the last load."""
+    order = np.argsort(s_m, kind="stable")
+    order = order[np.concatenate([[True], np.diff(s_m[order]) > 0.2])]
+    outside = order[s_m[order] >= saddles_m(inputs.config)[-1]]
+    moved = covariance.values[:, :, :3] - covariance.values[0, :, :3]
+    for number, hold in enumerate(solved.holds):
+        total = float(np.linalg.norm(moved[number], axis=1).max())
+        if number == 0 or len(outside) < 3 or total < 0.05:
+            continue
+        tip = moved[number, outside[-1]]
+        along = moved[number, outside] @ (tip / np.linalg.norm(tip))
+        slope = np.diff(along) / np.diff(s_m[outside])
+        back = np.maximum.accumulate(slope) - slope
+        worst = int(np.argmax(back))
+        yield Check(
+            "turns back outboard of the last load",
+            f"{1e3 * back[worst]:.2f} mrad",
+            f"{1e3 * TURN_BACK_RAD:g} mrad",
+            bool(back[worst] <= TURN_BACK_RAD),
+            f"hold {hold.label}, {s_m[outside][worst]:.0f} m",
+        )
+
+
+def loose_edges(inputs: Inputs, solved: Solved) -> list[str]:
+    """Say where echoes end far from the silhouette, so that these edges do not count."""
+    lidars = [inputs.lidars[place] for place in inputs.stands]
+    sides = ("leading", "trailing")
+    return [
+        f"hold {solved.holds[hold].label}, lidar {lidars[lidar]}: echoes end "
+        f"{1e3 * abs(off):.1f} mrad {'outside' if off > 0 else 'inside'} of the {sides[side]} edge "
+        "and do not count"
+        for hold, lidar, side, off in solved.native.loose_edges()
+    ]
 
 
 def objects(solved: Solved) -> Mapping[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from lidar_deflect import holds as hold_finder
 from lidar_deflect import instruments
 from lidar_deflect.errors import LidarDeflectError, MeasurementError
+from lidar_deflect.holds import Hold
 from lidar_deflect.measurement import paper
 
 if TYPE_CHECKING:
@@ -18,12 +19,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidar_deflect.channels import Prediction
-    from lidar_deflect.holds import Hold
     from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
     Times = NDArray[np.int64]
 
+GUESS_SHARE = 0.1
+"""Deflection under full load as a share of the length where no prediction tells it."""
 STILL_SHARE = 0.02
 """A load below this share counts as none."""
 
@@ -43,7 +45,9 @@ class Expected:
     direction
         Of the load, unit vector.
     source
-        Where this comes from: ``channel`` or ``paper``.
+        Where this comes from: ``channel``, ``paper``, or ``unloaded``: no other hold.
+    swings
+        Whether the blade is swung after it.
     """
 
     time_ns: Times
@@ -53,6 +57,7 @@ class Expected:
     deflection_m: Floats
     direction: Floats
     source: str
+    swings: bool = False
 
     def at(self, time_ns: Sequence[int] | Times) -> Floats:
         """Share of full load at instants, shape as given."""
@@ -73,6 +78,8 @@ def expected_of(inputs: Inputs) -> Expected:
     MeasurementError
         If there is neither a load channel with a prediction nor a result of the paper's method.
     """
+    if inputs.config.test.kind == "fatigue":
+        return swung(inputs)
     load, predicted = inputs.load, instruments.prediction(inputs.config)
     if load is not None and predicted is not None:
         s_m, deflection_m = _totals(predicted)
@@ -86,6 +93,38 @@ def expected_of(inputs: Inputs) -> Expected:
             source="channel",
         )
     return _from_paper(inputs)
+
+
+def swung(inputs: Inputs) -> Expected:
+    """Nothing but the unloaded hold stands still; from there the blade is swung.
+
+    Raises
+    ------
+    MeasurementError
+        If there is no such hold in these captures.
+    """
+    if inputs.unloaded_ns is None:
+        raise MeasurementError(
+            "a fatigue test is measured from its blade at rest, and these captures have none",
+            code="measurement.no_rest",
+            hint="record some seconds before the blade is swung, in the same files",
+        )
+    return replace(still(inputs, inputs.unloaded_ns), swings=True)
+
+
+def still(inputs: Inputs, window_ns: tuple[int, int]) -> Expected:
+    """Nothing moves in the unloaded hold."""
+    predicted = instruments.largest_predicted_m(inputs.config)
+    length = inputs.config.blade.length_m
+    return Expected(
+        time_ns=np.array(window_ns, dtype=np.int64),
+        share=np.zeros(2),
+        holds=(Hold(*window_ns, "0 %", 0.0),),
+        s_m=np.array([length]),
+        deflection_m=np.array([predicted or GUESS_SHARE * length]),
+        direction=np.array(inputs.config.load.direction or (1.0, 0.0, 0.0)),
+        source="unloaded",
+    )
 
 
 def _totals(predicted: Prediction) -> tuple[Floats, Floats]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.measurement.beam.adjustment import LAST, by_lidar, reading
+from lidar_deflect.measurement.beam.uncertainty import Spreads
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,6 +30,12 @@ OVERLAP_NS = 250_000_000
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
 FITTING = 0.8
 """A stretch of which fewer echoes than this share lie on the blade was not found."""
+SWAY_M = (0.15, 0.15, 0.04, 0.04)
+"""Standard deviations of the sway in its first mode in x and y and in its second, at the tip ..."""
+SWING_M = (4.0, 4.0, 0.5, 0.5)
+"""... and of a blade that is swung."""
+SWING_GATES = ((6.0, 5.0), (6.0, 5.0), (3.0, 3.0), (3.0, 2.0), (1.5, 1.5), *GATES)
+"""The swing is as far away as the blade swings: the search begins wide."""
 CHUNK = 48
 """Stretches that are worked on between two looks at Ctrl-C."""
 
@@ -41,8 +48,8 @@ class Followed:
     ----------
     values
         x, y, z in metres and twist change in rad, shape (t, s, 4); NaN where nothing was found.
-    noise
-        Their variance from noise alone, the same shape.
+    spreads
+        How well they are known.
     used
         Echoes that counted near each moment, shape (t, lidars).
     in_hold
@@ -52,26 +59,31 @@ class Followed:
     """
 
     values: Floats
-    noise: Floats
+    spreads: Spreads
     used: NDArray[np.uint32]
     in_hold: NDArray[np.int64]
     points: Mapping[str, Any]
 
 
 def follow(
-    inputs: Inputs, expected: Expected, solved: Solved, s_m: Floats, times_ns: Times
+    inputs: Inputs, expected: Expected, solved: Solved, times_ns: Times, counts: tuple[int, int]
 ) -> Followed:
-    """Find the state of every section at every moment."""
-    shape = (len(times_ns), len(s_m), 4)
-    values, noise = np.full(shape, np.nan), np.zeros(shape)
+    """Find the state of every section at every moment.
+
+    `counts` are those of the sections and of the stations of the blade line behind them; in a hold,
+    and in a stretch between holds, the latter have the spread of the middle instant.
+    """
+    shape = (len(times_ns), sum(counts), 4)
+    values, spreads = np.full(shape, np.nan), Spreads.empty(*shape[:2])
     used = np.zeros((len(times_ns), len(inputs.lidars)), dtype=np.uint32)
     in_hold = np.full(len(times_ns), -1, dtype=np.int64)
     half_ns = round(0.5e9 / inputs.rate_hz)
     points: list[Mapping[str, Any]] = []
     for number, (span, told) in enumerate(zip(solved.spans_ns, solved.told["holds"], strict=True)):
         inside = np.flatnonzero((times_ns >= span[0]) & (times_ns <= span[1]))
-        found = solved.native.states(number, s_m.tolist(), times_ns[inside].tolist())
-        values[inside] = found.reshape(len(inside), len(s_m), 4)
+        found, spread = solved.native.states(number, times_ns[inside].tolist(), counts[0])
+        values[inside] = found.reshape(len(inside), *shape[1:])
+        spreads.put(inside, spread)
         used[inside] = _count(told, times_ns[inside], half_ns, len(inputs.lidars))
         in_hold[inside] = number
         points.append(told)
@@ -83,18 +95,18 @@ def follow(
         part = stretches[start : start + CHUNK]
         seen = feed.take(len(part), inputs.listener("read"))
         moments = [times_ns[inside] for inside in part]
-        states = _between(expected, solved, s_m, seen, spans[start : start + CHUNK], moments)
+        states = _between(expected, solved, seen, spans[start : start + CHUNK], moments)
         for inside, result in zip(part, states, strict=True):
             if result is None or not _fits(result[2]):
                 continue
             told = by_lidar(result[2], inputs)
-            values[inside] = result[0].reshape(len(inside), len(s_m), 4)
-            noise[inside] = result[1].reshape(len(inside), len(s_m), 4)
+            values[inside] = result[0].reshape(len(inside), *shape[1:])
+            spreads.put(inside, result[1])
             used[inside] = _count(told, times_ns[inside], half_ns, len(inputs.lidars))
             points.append(told)
         if listener:
             listener(start + len(part), len(stretches))
-    return Followed(values, noise, used, in_hold, _joined(points))
+    return Followed(values, spreads, used, in_hold, _joined(points))
 
 
 def _stretches(times_ns: Times, in_hold: NDArray[np.int64]) -> list[NDArray[np.intp]]:
@@ -118,20 +130,20 @@ def _span(times_ns: Times, inside: NDArray[np.intp]) -> tuple[int, int]:
 def _between(
     expected: Expected,
     solved: Solved,
-    s_m: Floats,
     seen: Sequence[BeamSeen],
     spans: Sequence[tuple[int, int]],
     moments: Sequence[Times],
 ) -> list[Any]:
     native = solved.native
+    gates, sway_m = (SWING_GATES, SWING_M) if expected.swings else (GATES, SWAY_M)
     return native.follow(
         seen,
         spans,
         [expected.at(native.load_knots(span)).tolist() for span in spans],
         [times_ns.tolist() for times_ns in moments],
-        s_m.tolist(),
         list(solved.shares),
-        list(GATES),
+        list(gates),
+        list(sway_m),
     )
 
 
@@ -155,5 +167,5 @@ def _count(
 
 
 def _joined(parts: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "xyz_m")
+    names = ("time_ns", "lidar", "ring", "s_m", "residual_m", "chord", "xyz_m")
     return {name: np.concatenate([part[name] for part in parts]) for name in names}

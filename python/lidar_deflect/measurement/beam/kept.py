@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect import instruments
 from lidar_deflect.errors import MeasurementError
-from lidar_deflect.holds import Hold
 from lidar_deflect.measurement.beam.adjustment import LAST, solve
-from lidar_deflect.measurement.beam.expected import Expected
+from lidar_deflect.measurement.beam.expected import still
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance
 
 if TYPE_CHECKING:
@@ -26,8 +24,6 @@ if TYPE_CHECKING:
 STATION_M = 0.5
 FIRST_SHARE = 0.4
 """Stations are kept outboard of this share of the length."""
-GUESS_SHARE = 0.1
-"""Deflection under full load as a share of the length where no prediction tells it."""
 
 
 @dataclass(frozen=True)
@@ -89,24 +85,9 @@ def calibrated_reference(inputs: Inputs) -> Mapping[str, Any]:
         If the blade is not found in it.
     """
     assert inputs.unloaded_ns is not None
-    solved = solve(inputs, _still(inputs, inputs.unloaded_ns))
+    solved = solve(inputs, still(inputs, inputs.unloaded_ns))
     length = inputs.config.blade.length_m
     s_m = np.append(np.arange(FIRST_SHARE * length, length, STATION_M), length)
     found = HoldCovariance.of(solved, s_m, LAST)
     covariance = np.array([found.covariance[0, i, :3, 0, i, :3] for i in range(len(s_m))])
     return Kept(s_m, found.values[0, :, :3], covariance).to_dict()
-
-
-def _still(inputs: Inputs, window_ns: tuple[int, int]) -> Expected:
-    """Nothing moves in the unloaded hold."""
-    predicted = instruments.largest_predicted_m(inputs.config)
-    length = inputs.config.blade.length_m
-    return Expected(
-        time_ns=np.array(window_ns, dtype=np.int64),
-        share=np.zeros(2),
-        holds=(Hold(*window_ns, "0 %", 0.0),),
-        s_m=np.array([length]),
-        deflection_m=np.array([predicted or GUESS_SHARE * length]),
-        direction=np.array(inputs.config.load.direction or (1.0, 0.0, 0.0)),
-        source="unloaded",
-    )

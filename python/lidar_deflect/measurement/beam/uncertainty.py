@@ -1,4 +1,4 @@
-"""Standard uncertainties of positions, deflections and twist, from the holds' joint covariance."""
+"""Standard uncertainties of positions, deflections and twist, from one joint covariance."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidar_deflect.measurement.beam.adjustment import Solved
-    from lidar_deflect.measurement.beam.expected import Expected
-    from lidar_deflect.measurement.beam.following import Followed
 
     Floats = NDArray[np.float64]
 
@@ -40,36 +38,48 @@ class HoldCovariance:
         shape = (holds, sections, 4)
         return cls(values.reshape(shape), covariance.reshape(shape + shape))
 
-    def position_variance(self) -> Floats:
-        """Variance of x, y, z and twist in each hold, shape (h, s, 4)."""
-        holds, sections, _ = self.values.shape
-        flat = self.covariance.reshape(holds * sections * 4, -1)
-        return np.asarray(np.diag(flat).reshape(holds, sections, 4))
 
-    def position_covariance(self) -> Floats:
-        """Covariance of x, y, z in each hold, shape (h, s, 3, 3)."""
-        holds, sections, _ = self.values.shape
-        blocks = [
-            [self.covariance[h, s, :3, h, s, :3] for s in range(sections)] for h in range(holds)
-        ]
-        return np.array(blocks)
+@dataclass(frozen=True)
+class Spreads:
+    """How well the sections are known at every moment.
 
-    def deflection_covariance(self, reference: int = 0) -> Floats:
-        """Covariance of x, y, z minus those of the reference hold, shape (h, s, 3, 3)."""
-        holds, sections, _ = self.values.shape
-        found = np.zeros((holds, sections, 3, 3))
-        for hold in range(holds):
-            for section in range(sections):
-                at, rest = (hold, section), (reference, section)
-                block = {
-                    (a, b): self.covariance[a[0], a[1], :3, b[0], b[1], :3]
-                    for a in (at, rest)
-                    for b in (at, rest)
-                }
-                found[hold, section] = (
-                    block[at, at] + block[rest, rest] - block[at, rest] - block[rest, at]
-                )
-        return found
+    Attributes
+    ----------
+    position_m2, deflection_m2
+        Covariance of x, y, z and of their change since the hold with least load,
+        shape (t, s, 3, 3).
+    twist_rad2
+        Variance of the twist change, shape (t, s).
+    """
+
+    position_m2: Floats
+    deflection_m2: Floats
+    twist_rad2: Floats
+
+    @classmethod
+    def empty(cls, moments: int, sections: int) -> Spreads:
+        """Nothing is known yet."""
+        block = (moments, sections, 3, 3)
+        return cls(np.full(block, np.nan), np.full(block, np.nan), np.full(block[:2], np.nan))
+
+    def put(self, inside: NDArray[np.intp], rows: Floats) -> None:
+        """Take the rows of the compiled core, shape (len(inside) * s, 13), for some moments."""
+        shape = (len(inside), *self.twist_rad2.shape[1:])
+        at = rows.reshape(*shape, 13)
+        self.position_m2[inside] = _matrices(at[..., :6])
+        self.deflection_m2[inside] = _matrices(at[..., 6:12])
+        self.twist_rad2[inside] = at[..., 12]
+
+
+PLACES = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+"""Places of the columns of the compiled core in a symmetric matrix."""
+
+
+def _matrices(columns: Floats) -> Floats:
+    matrices = np.empty((*columns.shape[:-1], 3, 3))
+    for k, (i, j) in enumerate(PLACES):
+        matrices[..., i, j] = matrices[..., j, i] = columns[..., k]
+    return matrices
 
 
 @dataclass(frozen=True)
@@ -90,53 +100,23 @@ class Uncertainty:
     twist_rad: Floats
 
 
-def over_time(
-    covariance: HoldCovariance,
-    deflection: Floats,
-    solved: Solved,
-    expected: Expected,
-    followed: Followed,
-    times_ns: NDArray[np.int64],
-    deflection_m: Floats,
-) -> Uncertainty:
-    """Carry the holds' uncertainty to all moments; between holds that of both, and the noise.
+def over_time(spreads: Spreads, kept_m2: Floats | None, deflection_m: Floats) -> Uncertainty:
+    """Give the standard uncertainties of every moment.
 
     Parameters
     ----------
-    deflection
-        Covariance of the deflection in each hold, shape (h, s, 3, 3).
+    kept_m2
+        Covariance of a reference position from elsewhere, shape (s, 3, 3); None where it is that of
+        the hold with least load.
+    deflection_m
+        Shape (t, s, 3).
     """
-    position = covariance.position_variance()
-    low, high, share = _between(np.array(solved.shares), expected.at(times_ns))
-    inside = followed.in_hold >= 0
-    low[inside] = high[inside] = followed.in_hold[inside]
-    noise = followed.noise
-
-    def blend(of_holds: Floats) -> Floats:
-        weight = share.reshape(-1, *(1,) * (of_holds.ndim - 1))
-        return np.asarray(of_holds[low] * (1.0 - weight) + of_holds[high] * weight)
-
-    moved = blend(deflection)
-    moved[..., range(3), range(3)] += noise[..., :3]
+    moved = spreads.deflection_m2 if kept_m2 is None else spreads.position_m2 + kept_m2
     unit = deflection_m / np.maximum(np.linalg.norm(deflection_m, axis=2, keepdims=True), 1e-9)
-    total = np.einsum("tsi,tsij,tsj->ts", np.nan_to_num(unit), moved, np.nan_to_num(unit))
-    at = blend(position) + noise
+    total = np.einsum("tsi,tsij,tsj->ts", unit, moved, unit)
     return Uncertainty(
-        np.sqrt(np.maximum(at[..., :3], 0.0)),
+        np.sqrt(np.diagonal(spreads.position_m2, axis1=2, axis2=3)),
         np.sqrt(np.maximum(np.diagonal(moved, axis1=2, axis2=3), 0.0)),
         np.sqrt(np.maximum(total, 0.0)),
-        np.sqrt(np.maximum(at[..., 3], 0.0)),
+        np.sqrt(spreads.twist_rad2),
     )
-
-
-def _between(shares: Floats, load: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats]:
-    """Find the holds on both sides of each load, and the share of the way between them."""
-    order = np.argsort(shares, kind="stable")
-    sorted_shares = shares[order]
-    above = np.clip(np.searchsorted(sorted_shares, load), 1, max(1, len(shares) - 1))
-    if len(shares) == 1:
-        zero = np.zeros(len(load), dtype=np.intp)
-        return zero, zero.copy(), np.zeros(len(load))
-    low, high = order[above - 1], order[above]
-    reach = np.maximum(shares[high] - shares[low], 1e-9)
-    return low, high, np.clip((load - shares[low]) / reach, 0.0, 1.0)

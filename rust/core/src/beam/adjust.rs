@@ -14,9 +14,10 @@ use super::mesh::Mesh;
 use super::normal::Normal;
 use super::posed::{Posed, knots};
 use super::rig::{Lidar, Rig};
-use super::rows::{Rows, Tally, Weights};
+use super::rows::Rows;
 use super::shape::Shape;
 use super::track::zeros;
+use super::weights::{Tally, Weights};
 use crate::error::BeamError;
 
 /// Standard deviations of the sway in its first mode in x and y and in its second, metres at the tip.
@@ -25,18 +26,28 @@ const SWAY_M: [f64; 4] = [0.05, 0.05, 0.015, 0.015];
 const KNOT_NS: i64 = 200_000_000;
 /// Largest step of an unknown, standard deviations: farther away the neighbours are not linear.
 const LARGEST_STEP: f64 = 3.0;
+/// The same where deviations are those of blades in general.
+const LARGEST_VAGUE_STEP: f64 = 0.3;
+/// Gate from which on residuals tell of the data, not of a blade that is elsewhere, metres.
+const LEARNED_M: f64 = 0.1;
+/// Gate at which steps are held back as a prior would, metres.
+const FREE_GATE_M: f64 = 0.025;
+/// A step that takes back so much of the last one is halved: the truth lies between both.
+const TURNED_BACK: f64 = 0.5;
+/// The same of the surface, whose unknowns are many and each of little effect.
+const LARGEST_WAVE: f64 = 6.0;
 /// Standard deviation of how far edges lie outside of the silhouette, rad.
-pub const EDGE_RAD: f64 = 1e-3;
+pub const EDGE_RAD: f64 = 3e-4;
+/// How far they do, as beams of 1 to 3 mrad have it, rad.
+const EDGE_EXPECTED_RAD: f64 = 4e-4;
 /// The same of one hold, lidar and side against all, rad.
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
+/// Standard deviations of the range errors of a lidar on the blade: what blade and yard differ by, for
+/// they are not equally bright, and what grows with 1 / cos(incidence) - 1; metres.
+pub const RANGE_M: [f64; 2] = [0.001, 0.001];
 
-/// A stress-free curvature known no better than this has to be found with the loads, rad/m.
-const VAGUE_RAD_M: f64 = 1e-4;
 /// Data are taken for no better than this share of the gate while the gate is wide.
 const COARSE: f64 = 0.1;
-
-/// Inverse variance of what is held, against 1 of what is free.
-const HELD: f64 = 1e6;
 
 /// A hold as it enters the adjustment.
 #[derive(Debug, Clone)]
@@ -121,9 +132,14 @@ pub struct Adjustment {
     pub(super) knot_ns: i64,
     /// Whether the first mode in time is the load.
     pub(super) follows_load: bool,
+    /// Lidars and sides whose edges do not count.
+    pub(super) muted: Vec<(usize, usize)>,
     pub(super) shared: Vec<Unknown>,
     pub(super) own: Vec<Vec<Unknown>>,
     linear: Vec<Linear>,
+    /// The blade before the surface's unknowns; `problem.mesh` is what they make of it.
+    drawn: Mesh,
+    last_step: DVector<f64>,
 }
 
 /// What one iteration did.
@@ -155,20 +171,25 @@ impl Adjustment {
         };
         let mut adjustment = Self {
             values: DVector::zeros(layout.len()),
+            last_step: DVector::zeros(layout.len()),
             expected: DVector::zeros(layout.len()),
             tightness: DVector::repeat(layout.len(), 1.0),
             free: 0..layout.len(),
             modes_m: SWAY_M.to_vec(),
             knot_ns: KNOT_NS,
             follows_load: false,
+            muted: Vec::new(),
             layout,
             rig,
             weights,
             shared,
             own,
             linear: Vec::new(),
+            drawn: problem.mesh.clone(),
             problem,
         };
+        let edge = adjustment.layout.edge_at();
+        adjustment.expected[edge] = EDGE_EXPECTED_RAD / EDGE_RAD;
         adjustment.linearise()?;
         Ok(adjustment)
     }
@@ -261,12 +282,25 @@ impl Adjustment {
     pub(super) fn like(&self, problem: Problem, layout: Layout) -> Self {
         Self {
             values: zeros(layout.len()),
+            last_step: zeros(layout.len()),
             expected: zeros(layout.len()),
             tightness: DVector::repeat(layout.len(), 1.0),
             linear: Vec::new(),
+            weights: Weights {
+                noise_m: self.weights.noise_m.clone(),
+                common: Vec::new(),
+                ..self.weights
+            },
             problem,
             layout,
-            ..self.clone()
+            rig: self.rig.clone(),
+            free: self.free.clone(),
+            modes_m: self.modes_m.clone(),
+            muted: self.muted.clone(),
+            shared: self.shared.clone(),
+            own: self.own.clone(),
+            drawn: self.drawn.clone(),
+            ..*self
         }
     }
 
@@ -277,7 +311,14 @@ impl Adjustment {
             self.rig.values[unknown - rig] += change;
         } else {
             self.values[unknown] += change;
+            self.build();
         }
+    }
+
+    /// Brings the surface to its unknowns.
+    fn build(&mut self) {
+        let values = self.values.rows(self.layout.shape_at(), self.layout.shape);
+        self.problem.mesh = self.problem.shape.built(&self.drawn, values.as_slice());
     }
 
     /// Shared and own unknowns of a hold.
@@ -334,21 +375,30 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
-        let (normal, tallies) = self.normal(gates);
+        let (mut normal, tallies) = self.normal(gates);
+        self.damp(&mut normal, gates);
         let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
         let mut step = DVector::zeros(self.layout.len());
         step.rows_mut(self.free.start, self.free.len())
             .copy_from(&part);
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
         let largest = step.rows(0, self.layout.sway_at(0)).amax();
-        if largest > LARGEST_STEP {
-            step *= LARGEST_STEP / largest;
+        let swollen = step.rows(self.layout.shape_at(), self.layout.shape).amax();
+        let excess = (largest / self.largest_step(gates.stage)).max(swollen / LARGEST_WAVE);
+        if excess > 1.0 {
+            step /= excess;
+        }
+        if self.is_vague() {
+            self.settle(&mut step);
         }
         self.values += &step;
         self.rig.values += step.rows(rig, count);
         self.values.rows_mut(rig, count).fill(0.0);
+        if self.free.contains(&self.layout.shape_at()) {
+            self.build();
+        }
         if gates.stage == Stage::All {
-            self.weights.learn(&tallies);
+            self.weights.learn(&tallies, gates.echo_m <= LEARNED_M);
         }
         Ok(Step { largest, tallies })
     }
@@ -371,50 +421,35 @@ impl Adjustment {
         (sum, tallies)
     }
 
-    /// The first stage at which an unknown may change.
-    fn needs(&self, unknown: usize) -> Stage {
-        if unknown >= self.layout.lidar_at(0) {
-            return Stage::All;
+    /// Halves a step that takes the last one back.
+    fn settle(&mut self, step: &mut DVector<f64>) {
+        if step.dot(&self.last_step) < -TURNED_BACK * self.last_step.norm_squared() {
+            *step *= 0.5;
         }
-        let kind = if unknown < self.layout.shared {
-            Some(self.shared[unknown].kind)
-        } else {
-            self.own
-                .iter()
-                .flatten()
-                .nth(unknown - self.layout.shared)
-                .map(|own| own.kind)
-        };
-        let is_vague = self.problem.trust.free_rad_m > VAGUE_RAD_M;
-        match kind {
-            Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
-            Some(Kind::Free { mode: 0 | 1, .. }) if is_vague => Stage::Loads,
-            _ => Stage::Blade,
+        self.last_step.copy_from(step);
+    }
+
+    /// Holds back, while gates are wide, what a blade without a drawing could do far from where it is.
+    fn damp(&self, normal: &mut Normal, gates: &Gates) {
+        if !self.is_vague() || gates.stage != Stage::All {
+            return;
+        }
+        let rig = self.layout.lidar_at(0)..self.layout.shape_at();
+        let damping = (gates.echo_m / FREE_GATE_M).powi(2);
+        for (place, unknown) in self.free.clone().enumerate() {
+            if !rig.contains(&unknown) {
+                normal.matrix[(place, place)] += damping;
+            }
         }
     }
 
-    /// What is known before the data.
-    fn prior(&self, stage: Stage) -> Normal {
-        let mut prior = Normal::new(self.free.clone());
-        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
-        for (place, i) in self.free.clone().enumerate() {
-            let is_held = self.needs(i) > stage;
-            let tight = if is_held { HELD } else { self.tightness[i] };
-            prior.matrix[(place, place)] = tight;
-            prior.right[place] = tight * (self.expected[i] - self.values[i]);
+    /// How far an unknown of the blade may go in one step, standard deviations.
+    fn largest_step(&self, stage: Stage) -> f64 {
+        if self.is_vague() && stage == Stage::All {
+            LARGEST_VAGUE_STEP
+        } else {
+            LARGEST_STEP
         }
-        if self.free.contains(&rig) {
-            let at = rig - self.free.start;
-            let hold = if stage == Stage::All { 1.0 } else { HELD };
-            let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
-            let information = &self.rig.information * hold;
-            prior
-                .matrix
-                .view_mut((at, at), (count, count))
-                .copy_from(&information);
-            prior.right.rows_mut(at, count).copy_from(&(pull * hold));
-        }
-        prior
     }
 }
 

@@ -25,8 +25,9 @@ pub struct Physics {
     pub couples_nm: Vec<f64>,
     /// Weight over the guess, by element.
     pub weight: Vec<f64>,
-    /// Compliance over that of the drawing: edgewise, flapwise, torsion, by element.
-    pub soft: [Vec<f64>; 3],
+    /// Compliance over that of the drawing: edgewise, flapwise, torsion, by element; and coupling of
+    /// both bendings, which drawings do not tell, as a share of the mean of their stiffnesses.
+    pub soft: [Vec<f64>; 4],
     /// Added stress-free curvature, by element, rad/m.
     pub free: Vec<Vector3<f64>>,
     /// Stress-free curvature over that of the drawing.
@@ -47,7 +48,7 @@ impl Physics {
             full: vec![Vector3::zeros(); saddles.len()],
             couples_nm: vec![0.0; saddles.len()],
             weight: vec![1.0; elements],
-            soft: [(); 3].map(|()| vec![1.0; elements]),
+            soft: [1.0, 1.0, 1.0, 0.0].map(|share| vec![share; elements]),
             free: vec![Vector3::zeros(); elements],
             prebend: 1.0,
             root_rad: Vector3::zeros(),
@@ -115,7 +116,7 @@ impl Physics {
 
     fn bend(&self, mesh: &Mesh, element: usize, moment: &Vector3<f64>) -> Vector3<f64> {
         let by = |k: usize| mesh.compliance[element][k] * moment * self.soft[k][element];
-        mesh.free[element] * self.prebend + self.free[element] + by(0) + by(1) + by(2)
+        mesh.free[element] * self.prebend + self.free[element] + by(0) + by(1) + by(2) + by(3)
     }
 
     fn loads_by_node(&self, nodes: usize) -> Vec<(Vector3<f64>, f64)> {

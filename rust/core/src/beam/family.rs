@@ -31,9 +31,10 @@ pub enum Kind {
     Load,
     /// Weight, relative, as a function along the span.
     Weight(usize),
-    /// Compliance, relative: 0 edgewise, 1 flapwise, 2 torsion; as a function along the span.
+    /// Compliance, relative: 0 edgewise, 1 flapwise, 2 torsion, 3 coupling of both bendings; as a
+    /// function along the span.
     Soft {
-        /// Which of the three.
+        /// Which of the four.
         which: usize,
         /// Number of the function along the span.
         mode: usize,
@@ -76,6 +77,9 @@ pub struct Trust {
     pub free_rad_m: f64,
     /// Standard deviation of the root's rotation, rad.
     pub root_rad: f64,
+    /// Standard deviation of each function of the coupling of both bendings, as a share of the mean of
+    /// their stiffnesses.
+    pub coupling: f64,
 }
 
 impl Default for Trust {
@@ -87,9 +91,13 @@ impl Default for Trust {
             prebend: 0.05,
             free_rad_m: 1.5e-5,
             root_rad: 1e-3,
+            coupling: 0.06,
         }
     }
 }
+
+/// Number of the compliance that couples both bendings.
+const COUPLING: usize = 3;
 
 /// Unknowns that all states of one blade share.
 pub fn shared_unknowns(trust: &Trust) -> Vec<Unknown> {
@@ -101,6 +109,13 @@ pub fn shared_unknowns(trust: &Trust) -> Vec<Unknown> {
         for which in 0..3 {
             add(Kind::Soft { which, mode }, trust.stiffness * wave);
         }
+        add(
+            Kind::Soft {
+                which: COUPLING,
+                mode,
+            },
+            trust.coupling,
+        );
         for axis in 0..2 {
             add(Kind::Free { axis, mode }, trust.free_rad_m);
         }
@@ -269,7 +284,7 @@ fn sway_response(mesh: &Mesh, at: &Axis, order: usize, direction: &Vector3<f64>)
         about += middle.cross(&inertia);
         let turn = 0.5 * (at.turn[e] + at.turn[e + 1]);
         let moment = turn.tr_mul(&(about - middle.cross(&force)));
-        let [edge, flap, torsion] = &mesh.compliance[e];
+        let [edge, flap, torsion, _] = &mesh.compliance[e];
         curvature[e] = (edge + flap + torsion) * moment;
     }
     let still = Vector3::zeros();

@@ -19,6 +19,8 @@ pub struct Layout {
 
 /// Unknowns of a lidar beside its channels: pose, elevation, scale.
 pub const RIG: usize = 8;
+/// Range errors of a lidar on the blade: against the yard's, and with the slant of the surface.
+pub const RANGES: usize = 2;
 
 impl Layout {
     /// First unknown of a hold.
@@ -58,9 +60,25 @@ impl Layout {
         self.edge_at() + 1 + 2 * (hold * self.channels.len() + lidar) + side
     }
 
+    /// Hold, lidar and side of an edge offset; none for another unknown.
+    pub fn edge_group(&self, unknown: usize) -> Option<(usize, usize, usize)> {
+        let first = self.edge_at() + 1;
+        let is_one = (first..self.range_at(0)).contains(&unknown);
+        let lidars = self.channels.len();
+        is_one.then(|| {
+            let group = (unknown - first) / 2;
+            (group / lidars, group % lidars, (unknown - first) % 2)
+        })
+    }
+
+    /// First unknown of the range errors of a lidar on the blade.
+    pub fn range_at(&self, lidar: usize) -> usize {
+        self.edge_offset_at(self.own.len(), 0, 0) + RANGES * lidar
+    }
+
     /// Number of unknowns.
     pub fn len(&self) -> usize {
-        self.edge_offset_at(self.own.len(), 0, 0)
+        self.range_at(self.channels.len())
     }
 
     /// Whether there is none: never.

@@ -27,8 +27,9 @@ pub struct Mesh {
     pub chord_m: Vec<f64>,
     /// Stress-free curvature of each element, rad/m, in its own directions.
     pub free: Vec<Vector3<f64>>,
-    /// Compliance of each element by edgewise, flapwise and torsional stiffness, 1/(N m^2).
-    pub compliance: Vec<[Matrix3<f64>; 3]>,
+    /// Compliance of each element by edgewise, flapwise and torsional stiffness and by a whole coupling
+    /// of both bendings, 1/(N m^2).
+    pub compliance: Vec<[Matrix3<f64>; 4]>,
     /// A first guess of the mass per length of each element, kg/m.
     pub mass_kg_m: Vec<f64>,
     /// World directions of the root, stress-free.
@@ -131,15 +132,17 @@ fn middle(design: &Design, s_m: f64) -> Vector3<f64> {
     design.directions(s_m)[0] * ((0.5 - design.axis_fraction(s_m)) * design.chord_m(s_m))
 }
 
-fn compliance(design: &Design, s_m: f64) -> [Matrix3<f64>; 3] {
+fn compliance(design: &Design, s_m: f64) -> [Matrix3<f64>; 4] {
     let [chord, normal] = design.directions(s_m);
     let [edge, flap, torsion] = design.stiffness_nm2(s_m);
     let along = |axis: Vector3<f64>, stiffness: f64| axis * axis.transpose() / stiffness;
+    let both = chord * normal.transpose();
     // Edgewise bending turns about the chord's normal, flapwise bending about the chord.
     [
         along(normal, edge),
         along(chord, flap),
         along(Vector3::z(), torsion),
+        (both + both.transpose()) / (edge * flap).sqrt(),
     ]
 }
 

@@ -2,10 +2,14 @@
 //!
 //! [`design`] and [`mesh`] hold the drawing, [`equilibrium`] and [`family`] say which states it can
 //! have, [`axis`] keeps its length, [`sight`] meets it with rays and scan planes, [`adjust`] puts
-//! everything into one adjustment. Source: docs/method.md.
+//! everything into one adjustment, [`common`] says what neighbouring data share, [`track`] follows the blade between
+//! holds and [`carry`] tells how well each instant is known. Source: docs/method.md.
 
 pub mod adjust;
 pub mod axis;
+pub mod budget;
+pub mod carry;
+pub mod common;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;
@@ -14,7 +18,9 @@ pub mod gather;
 pub mod layout;
 pub mod mesh;
 pub mod normal;
+pub mod outline;
 pub mod posed;
+mod prior;
 pub mod rig;
 pub mod rows;
 #[cfg(test)]
@@ -25,3 +31,4 @@ pub mod sight;
 pub mod start;
 mod table;
 pub mod track;
+pub mod weights;

@@ -2,13 +2,15 @@
 
 use nalgebra::Vector3;
 
-use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates};
+use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M};
+use super::common;
 use super::echoes::{Echo, Edge};
 use super::layout::RIG;
 use super::normal::Normal;
 use super::posed::Posed;
 use super::rig::Lidar;
 use super::sight::{Contact, Hit, ScanPlane, Silhouette};
+use super::weights::{EdgeMet, Tally, Used, robust};
 
 /// Echoes nearer to the end of their run than this are mixed with what lies behind.
 const MIXED_ECHOES: u32 = 2;
@@ -16,76 +18,6 @@ const MIXED_ECHOES: u32 = 2;
 const FLATTEST_COSINE: f64 = 0.25;
 /// An edge beside facets seen at a grazing angle over more than this is soft, metres across.
 const SOFT_M: f64 = 0.012;
-/// Residuals beyond so many standard deviations count less.
-const ROBUST: f64 = 3.0;
-
-/// How data are weighted.
-#[derive(Debug, Clone)]
-pub struct Weights {
-    /// Standard deviation of a range of each lidar, metres.
-    pub noise_m: Vec<f64>,
-    /// Standard deviation of the surface about its model, along the normal, metres.
-    pub surface_m: f64,
-    /// Standard deviation of an edge beyond that of the step between shots, rad.
-    pub edge_rad: f64,
-    /// At most so many echoes of a hold are used.
-    pub echoes: usize,
-}
-
-/// What became of the data of a hold.
-#[derive(Debug, Clone, Default)]
-pub struct Tally {
-    /// Echoes that counted.
-    pub used: Vec<Used>,
-    /// Residuals of the edges in steps between shots, with lidar and side.
-    pub edges: Vec<(usize, usize, f64)>,
-    /// Echoes whose rays miss the blade.
-    pub missed: usize,
-    /// Echoes beyond the gate.
-    pub rejected: Vec<Used>,
-    /// Echoes at grazing angles or ends of runs.
-    pub unfit: usize,
-    /// Edges that were soft, missed the blade, or lay beyond the gate.
-    pub edges_left_out: [usize; 3],
-}
-
-/// An echo that met the model, whether it counted or not.
-#[derive(Debug, Clone, Copy)]
-pub struct Used {
-    /// Instant, nanoseconds.
-    pub time_ns: i64,
-    /// Number of the lidar.
-    pub lidar: usize,
-    /// Number of the beam.
-    pub ring: usize,
-    /// Arc length at which its ray meets the model, metres.
-    pub s_m: f64,
-    /// Measured minus modelled range, metres.
-    pub residual_m: f64,
-    /// Measured point, world, metres.
-    pub point: Vector3<f64>,
-}
-
-impl Weights {
-    /// Takes the noise of each lidar from the residuals: 1.48 of their median size.
-    pub fn learn(&mut self, tallies: &[Tally]) {
-        for lidar in 0..self.noise_m.len() {
-            let of = |t: &Tally| -> Vec<f64> {
-                t.used
-                    .iter()
-                    .filter(|u| u.lidar == lidar)
-                    .map(|u| u.residual_m.abs())
-                    .collect()
-            };
-            let mut sizes: Vec<f64> = tallies.iter().flat_map(of).collect();
-            if sizes.len() > 200 {
-                let middle = sizes.len() / 2;
-                let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
-                self.noise_m[lidar] = (1.4826 * *median).clamp(0.002, 0.1);
-            }
-        }
-    }
-}
 
 /// Makes the rows of one hold.
 pub struct Rows<'a> {
@@ -137,6 +69,14 @@ impl<'a> Rows<'a> {
         (self.normal, self.tally)
     }
 
+    /// The rows of the edges alone.
+    pub(super) fn of_edges(mut self) -> Normal {
+        for edge in &self.adjustment.problem.holds[self.hold].seen.edges {
+            self.add_edge(edge);
+        }
+        self.normal
+    }
+
     /// Adds one echo; gives the arc length at which it met the blade, for the next one.
     fn add_echo(&mut self, echo: &Echo, hint: Option<f64>) -> Option<f64> {
         let lidar = &self.lidars[echo.lidar];
@@ -151,11 +91,12 @@ impl<'a> Rows<'a> {
             return arc_m;
         }
         let mut row = self.echo_row(echo, &hit);
-        let built_m = self.built(&row);
-        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - built_m;
+        let misread_m = self.misread_m(&row);
+        let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - misread_m;
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
         let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
+        let patch = self.patch(&hit.contact);
         let met = Used {
             time_ns: echo.time_ns,
             lidar: echo.lidar,
@@ -163,13 +104,21 @@ impl<'a> Rows<'a> {
             s_m: self.arc_m(&hit.contact),
             residual_m: residual,
             point: lidar.origin + direction * (hit.range_m + residual),
+            chord: self.chord(&hit.contact),
+            cosine: hit.cosine,
+            patch,
         };
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
             self.tally.rejected.push(met);
             return arc_m;
         }
         self.tally.used.push(met);
-        let weight = robust(residual, sigma, self.gates.echo_m) / (sigma * sigma);
+        let alone = (hit.cosine / noise_m).powi(2);
+        let factor = match weights.common.get(self.hold) {
+            Some(common) => common.echo_factor(patch, weights.surface_m, alone),
+            None => 1.0 + weights.surface_m * weights.surface_m * alone,
+        };
+        let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
         self.normal.add(&mut row, residual, weight);
         arc_m
     }
@@ -190,18 +139,32 @@ impl<'a> Rows<'a> {
         })
     }
 
+    fn chord(&self, contact: &Contact) -> f64 {
+        let is_pressure = contact.vertex >= self.adjustment.problem.mesh.outline[0].len() / 2;
+        if is_pressure {
+            -contact.x_c
+        } else {
+            contact.x_c
+        }
+    }
+
     fn arc_m(&self, contact: &Contact) -> f64 {
         let mesh = &self.adjustment.problem.mesh;
         let section = &contact.section;
         mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
     }
 
-    /// What the surface as built adds to the prediction of the drawing, by a row's slopes.
-    fn built(&self, row: &[(usize, f64)]) -> f64 {
+    fn patch(&self, contact: &Contact) -> usize {
+        let is_second_side = contact.vertex >= self.adjustment.problem.mesh.outline[0].len() / 2;
+        common::patch(self.arc_m(contact), is_second_side, contact.x_c)
+    }
+
+    /// What errors of range add to the prediction, by a row's slopes.
+    fn misread_m(&self, row: &[(usize, f64)]) -> f64 {
         let (layout, values) = (&self.adjustment.layout, &self.adjustment.values);
-        let surface = layout.shape_at()..layout.edge_at();
-        let of_surface = row.iter().filter(|entry| surface.contains(&entry.0));
-        of_surface
+        let ranges = layout.range_at(0)..;
+        let of_ranges = row.iter().filter(|entry| ranges.contains(&entry.0));
+        of_ranges
             .map(|(unknown, slope)| slope * values[*unknown])
             .sum()
     }
@@ -209,19 +172,15 @@ impl<'a> Rows<'a> {
     fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
         let along = -hit.contact.normal / hit.cosine;
         let mut row = self.row(&hit.contact, &along, echo.lidar, echo.time_ns);
-        let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
-        problem.shape.waves(
-            &problem.mesh,
-            &hit.contact,
-            &along,
-            layout.shape_at(),
-            &mut row,
-        );
+        let layout = &self.adjustment.layout;
         let first = layout.lidar_at(echo.lidar);
         row.push((first + 7, -hit.range_m));
         if echo.ring < layout.channels[echo.lidar] {
             row.push((first + RIG + echo.ring, -1.0));
         }
+        let ranges = layout.range_at(echo.lidar);
+        row.push((ranges, RANGE_M[0]));
+        row.push((ranges + 1, RANGE_M[1] * (1.0 / hit.cosine - 1.0)));
         row
     }
 
@@ -247,10 +206,14 @@ impl<'a> Rows<'a> {
                     .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
             );
         }
-        problem
-            .shape
-            .slopes(&problem.mesh, contact, along, layout.shape_at(), &mut row);
+        let (mesh, first) = (&problem.mesh, layout.shape_at());
+        problem.shape.slopes(mesh, contact, along, first, &mut row);
+        problem.shape.waves(mesh, contact, along, first, &mut row);
         self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
+        if self.adjustment.free.end > layout.len() {
+            // A strain is fitted as a check: everything moves away from the root.
+            row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
+        }
         row
     }
 
@@ -291,23 +254,35 @@ impl<'a> Rows<'a> {
         let values = &self.adjustment.values;
         let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
         let mut row = self.edge_row(edge, plane, silhouette);
-        let built_rad = self.built(&row);
-        let residual = 0.5 * step_rad - silhouette.angle_rad - outside - built_rad;
+        if self.adjustment.muted.contains(&(edge.lidar, side)) {
+            self.tally.edges_left_out[2] += 1;
+            return;
+        }
+        let residual = 0.5 * step_rad - silhouette.angle_rad - outside;
         let coarse_rad = self.gates.coarse_m()[1] / silhouette.range_m;
-        let sigma_rad = self.adjustment.weights.edge_rad.hypot(coarse_rad);
+        let weights = &self.adjustment.weights;
+        let sigma_rad = weights.edge_rad.hypot(coarse_rad);
         let sigma = (step_rad / 12f64.sqrt()).hypot(sigma_rad);
+        let known = weights.common.get(self.hold);
+        let grid = known
+            .and_then(|common| common.edge_variance(edge.lidar, side, edge.ring))
+            .unwrap_or(step_rad * step_rad / 12.0);
         let gate_rad = (self.gates.edge_m / silhouette.range_m).max(4.0 * sigma);
         let depth_m = (edge.range_m - silhouette.range_m).abs();
         if residual.abs() > gate_rad || depth_m > self.gates.echo_m.max(0.5) {
             self.tally.edges_left_out[2] += 1;
             return;
         }
-        self.tally
-            .edges
-            .push((edge.lidar, side, residual / step_rad));
+        self.tally.edges.push(EdgeMet {
+            lidar: edge.lidar,
+            ring: edge.ring,
+            side,
+            residual_rad: residual,
+            step_rad,
+        });
         row.push((layout.edge_at(), EDGE_RAD));
         row.push((at, EDGE_OFFSET_RAD));
-        let weight = robust(residual, sigma, gate_rad) / (sigma * sigma);
+        let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
         self.normal.add(&mut row, residual, weight);
     }
 
@@ -330,12 +305,6 @@ impl<'a> Rows<'a> {
 /// 0 at the leading edge, 1 at the trailing edge.
 fn side_of(x_c: f64) -> usize {
     usize::from(x_c > 0.5)
-}
-
-/// Weight of a residual: it fades beyond a few standard deviations, later while the gate is wide.
-fn robust(residual: f64, sigma: f64, gate: f64) -> f64 {
-    let width = (ROBUST * sigma).max(0.3 * gate);
-    1.0 / (1.0 + (residual / width).powi(2))
 }
 
 #[cfg(test)]

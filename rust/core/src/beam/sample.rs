@@ -9,8 +9,8 @@ use super::family::{Loading, Trust};
 use super::layout::RIG;
 use super::mesh::Mesh;
 use super::rig::Rig;
-use super::rows::Weights;
 use super::shape::{Shape, ShapeTrust};
+use super::weights::Weights;
 use crate::frame::WorldFromSensor;
 
 const CHANNELS: usize = 8;
@@ -89,6 +89,7 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
         surface_m: 0.0,
         edge_rad: 1e-4,
         echoes: 100_000,
+        common: Vec::new(),
     };
     let mut adjustment = Adjustment::new(problem, rig.unwrap(), weights).unwrap();
     adjustment.problem.holds[0].seen = look(&adjustment, shift_m);

@@ -2,11 +2,10 @@
 
 use nalgebra::{DMatrix, Rotation3, Vector3};
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::Adjustment;
 use super::mesh::Mesh;
 use super::posed::Posed;
 use super::sight::{Contact, Section};
-use crate::error::BeamError;
 
 /// Sections of all holds with one covariance.
 #[derive(Debug, Clone)]
@@ -18,46 +17,74 @@ pub struct Sections {
     pub covariance: DMatrix<f64>,
 }
 
+/// Sections in the first hold.
+#[derive(Debug, Clone)]
+pub struct Rests {
+    /// Arc lengths, metres.
+    pub s_m: Vec<f64>,
+    pub(super) posed: Posed,
+    pub(super) places: Vec<Place>,
+}
+
 /// One section of one state.
+#[derive(Debug, Clone)]
 pub(super) struct Place {
-    contact: Contact,
+    pub(super) contact: Contact,
     chord: Vector3<f64>,
-    point: Vector3<f64>,
+    pub(super) point: Vector3<f64>,
     sway: Vec<(usize, f64)>,
 }
 
 impl Adjustment {
-    /// The sections at `s_m` of all holds.
-    ///
-    /// # Errors
-    /// [`BeamError::Singular`].
-    pub fn sections(&self, s_m: &[f64], gates: &Gates) -> Result<Sections, BeamError> {
-        let posed: Vec<Posed> = (0..self.problem.holds.len())
-            .map(|hold| self.posed(hold))
-            .collect();
-        let count = posed.len() * s_m.len();
+    /// The sections at `s_m` of all holds, and how all unknowns move them: columns in the order of the
+    /// values.
+    pub(super) fn section_rows(&self, rests: &Rests) -> (Vec<[f64; 4]>, DMatrix<f64>) {
+        let holds = self.problem.holds.len();
+        let count = holds * rests.s_m.len();
         let mut values = Vec::with_capacity(count);
         let mut rows = DMatrix::zeros(self.layout.len(), 4 * count);
-        for (hold, blade) in posed.iter().enumerate() {
-            for (i, s) in s_m.iter().enumerate() {
-                let first = 4 * (hold * s_m.len() + i);
-                let at = self.place_at(blade, hold, *s, None);
-                let rest = self.place_at(&posed[0], 0, *s, None);
-                values.push(self.fill_state(&mut rows, first, blade, hold, &at, &rest));
-                let (_, slopes) = twist(&self.problem.mesh, &rest, &at);
-                self.fill(
-                    &mut rows,
-                    first + 3,
-                    (&posed[0], 0),
-                    &rest,
-                    &Vector3::zeros(),
-                    &slopes[0],
-                );
+        for hold in 0..holds {
+            let posed = self.posed(hold);
+            for (s_m, rest) in rests.s_m.iter().zip(&rests.places) {
+                let (at, first) = (self.place_at(&posed, hold, *s_m, None), 4 * values.len());
+                values.push(self.fill_state(&mut rows, first, &posed, hold, &at, rest));
+                self.fill_rest(&mut rows, first + 3, &rests.posed, rest, &at);
             }
         }
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let covariance = rows.tr_mul(&factor.solve(&rows));
-        Ok(Sections { values, covariance })
+        (values, rows)
+    }
+
+    /// The sections at `s_m` in the first hold.
+    pub(super) fn rests(&self, s_m: &[f64]) -> Rests {
+        let posed = self.posed(0);
+        Rests {
+            s_m: s_m.to_vec(),
+            places: s_m
+                .iter()
+                .map(|s| self.place_at(&posed, 0, *s, None))
+                .collect(),
+            posed,
+        }
+    }
+
+    /// How the first hold's unknowns move the twist of a section since then.
+    pub(super) fn fill_rest(
+        &self,
+        rows: &mut DMatrix<f64>,
+        column: usize,
+        posed: &Posed,
+        rest: &Place,
+        at: &Place,
+    ) {
+        let (_, slopes) = twist(&self.problem.mesh, rest, at);
+        self.fill(
+            rows,
+            column,
+            (posed, 0),
+            rest,
+            &Vector3::zeros(),
+            &slopes[0],
+        );
     }
 
     /// Position and twist of a section of a hold, with their slopes in four columns from `first`.
@@ -131,7 +158,9 @@ impl Adjustment {
             contact,
             sway,
         };
-        place.point += self.correction((blade, hold), &place, time_ns.is_none());
+        if time_ns.is_none() {
+            place.point += self.mean_correction((blade, hold), &place);
+        }
         place
     }
 
@@ -148,25 +177,21 @@ impl Adjustment {
         weights.into_iter().enumerate().collect()
     }
 
-    /// What the surface unknowns add to the point of the drawing, and the sway where it is not in it.
-    fn correction(&self, of: (&Posed, usize), place: &Place, has_sway: bool) -> Vector3<f64> {
+    /// What the sway of the hold's mean adds to the place at rest.
+    pub(super) fn mean_correction(&self, of: (&Posed, usize), place: &Place) -> Vector3<f64> {
         let mut rows = DMatrix::zeros(self.layout.len(), 3);
         for axis in 0..3 {
             let along = Vector3::ith(axis, 1.0);
             self.fill(&mut rows, axis, of, place, &along, &Vector3::zeros());
         }
-        let mut values = self.values.clone();
-        let posed = if has_sway {
-            self.layout.sway_at(0)
-        } else {
-            self.layout.lidar_at(0)
-        };
-        values.rows_mut(0, posed).fill(0.0);
-        Vector3::from_iterator(rows.tr_mul(&values).iter().copied())
+        let sway = self.layout.sway_at(0)..self.layout.lidar_at(0);
+        let (of_sway, count) = (rows.rows(sway.start, sway.len()), sway.len());
+        let values = self.values.rows(sway.start, count);
+        Vector3::from_iterator(of_sway.tr_mul(&values).iter().copied())
     }
 
     /// Adds to a column how all unknowns move a place along `along` and turn it about `turn`.
-    fn fill(
+    pub(super) fn fill(
         &self,
         rows: &mut DMatrix<f64>,
         column: usize,

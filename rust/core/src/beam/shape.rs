@@ -1,5 +1,7 @@
 //! The surface as built: chord, setting angle and waves against the drawing.
 
+mod built;
+
 use std::f64::consts::PI;
 
 use super::mesh::Mesh;
@@ -22,6 +24,8 @@ pub struct ShapeTrust {
     pub axis_fraction: f64,
     /// Of each wave of the surface, metres.
     pub waves_m: f64,
+    /// Distance between the knots of chord and twist, metres.
+    pub slow_knot_m: f64,
 }
 
 impl Default for ShapeTrust {
@@ -34,16 +38,19 @@ impl Default for ShapeTrust {
             twist_waves_rad: 0.0005,
             axis_fraction: 0.002,
             waves_m: 0.002,
+            slow_knot_m: 9.0,
         }
     }
 }
 
 /// Waves over the chord of each side.
 const CHORD_WAVES: usize = 4;
+/// Share of the chord beside an edge over which waves rise to their height.
+const NEAR_EDGE: f64 = 0.04;
+/// Chord from which on waves have their full height, metres.
+const FULL_WAVES_M: f64 = 1.0;
 /// Distance between the knots of the waves, metres.
 const KNOT_M: f64 = 3.0;
-/// Distance between the knots of chord and twist, metres.
-const SLOW_KNOT_M: f64 = 9.0;
 
 /// Unknowns of the surface, in standard deviations.
 #[derive(Debug, Clone)]
@@ -61,7 +68,7 @@ impl Shape {
         Self {
             trust,
             from_m,
-            slow: (length / SLOW_KNOT_M).ceil() as usize + 1,
+            slow: (length / trust.slow_knot_m).ceil() as usize + 1,
             knots: (length / KNOT_M).ceil() as usize + 1,
         }
     }
@@ -94,7 +101,7 @@ impl Shape {
         out.push((first + 1, self.trust.setting_rad * twist));
         out.push((first + 2, -self.trust.axis_fraction * local.dot(&chord)));
         let s_m = self.arc_m(mesh, contact);
-        for (knot, weight) in hats(s_m - self.from_m, SLOW_KNOT_M, self.slow) {
+        for (knot, weight) in hats(s_m - self.from_m, self.trust.slow_knot_m, self.slow) {
             out.push((first + 3 + knot, self.trust.chord_waves * weight * swell));
             out.push((
                 first + 3 + self.slow + knot,
@@ -112,21 +119,33 @@ impl Shape {
         first: usize,
         out: &mut Vec<(usize, f64)>,
     ) {
-        let outward = self.trust.waves_m * along.dot(&contact.normal);
+        let outward = self.waves_m(mesh, contact.section.node) * along.dot(&contact.normal);
         let side = usize::from(contact.vertex >= mesh.outline[0].len() / 2);
         let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;
         for (knot, weight) in hats(self.arc_m(mesh, contact) - self.from_m, KNOT_M, self.knots) {
             for wave in 0..CHORD_WAVES {
-                let height = (PI * wave as f64 * contact.x_c).cos();
+                let height = height(wave, contact.x_c);
                 out.push((first + knot * CHORD_WAVES + wave, outward * weight * height));
             }
         }
+    }
+
+    /// Standard deviation of a wave at a node: a chord of centimetres has none of millimetres.
+    fn waves_m(&self, mesh: &Mesh, node: usize) -> f64 {
+        self.trust.waves_m * (mesh.chord_m[node] / FULL_WAVES_M).min(1.0)
     }
 
     fn arc_m(&self, mesh: &Mesh, contact: &Contact) -> f64 {
         let section = &contact.section;
         mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
     }
+}
+
+/// Height of a wave at a place along the chord: none at both edges, which chord and axis place.
+fn height(wave: usize, x_c: f64) -> f64 {
+    let nose = (x_c / NEAR_EDGE).clamp(0.0, 1.0).sqrt();
+    let tail = ((1.0 - x_c) / NEAR_EDGE).clamp(0.0, 1.0);
+    nose * tail * (PI * wave as f64 * x_c).cos()
 }
 
 /// Two hat functions that are not zero at `x`, and their values; constant beyond the ends.

@@ -183,8 +183,9 @@ impl Instant<'_> {
             return None;
         }
         let count = mesh.outline[0].len();
-        let view = |vertex: usize, s_m: f64| self.seen(mesh, plane, &across, vertex, s_m);
-        let views: Vec<View> = (0..count).map(|vertex| view(vertex, s_m)).collect();
+        let section = self.section(mesh, s_m);
+        let view = |vertex: usize| seen(mesh, plane, &across, &section, vertex, s_m);
+        let views: Vec<View> = (0..count).map(view).collect();
         let outermost = (0..count).max_by(|a, b| views[*a].angle.total_cmp(&views[*b].angle))?;
         let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
         let refined = near.map(|vertex| {
@@ -218,31 +219,31 @@ impl Instant<'_> {
         vertex: usize,
         s_m: f64,
     ) -> View {
-        let once = self.seen(mesh, plane, across, vertex, s_m);
-        self.seen(mesh, plane, across, vertex, once.s_m)
+        let view = |s_m| seen(mesh, plane, across, &self.section(mesh, s_m), vertex, s_m);
+        view(view(s_m).s_m)
     }
+}
 
-    /// Where a point of the outline passes through a scan plane, by its slope at `s_m`.
-    fn seen(
-        &self,
-        mesh: &Mesh,
-        plane: &ScanPlane,
-        across: &Vector3<f64>,
-        vertex: usize,
-        s_m: f64,
-    ) -> View {
-        let section = self.section(mesh, s_m);
-        let contact = contact(mesh, section, vertex, 0.0);
-        let slope = section.turn * span_slope(mesh, &section, vertex, 0.0, &contact.local);
-        let step = -across.dot(&(contact.point - plane.origin)) / across.dot(&slope);
-        let to = contact.point + slope * step - plane.origin;
-        let (ahead_m, aside_m) = (to.dot(&plane.ahead), to.dot(&plane.aside));
-        View {
-            angle: aside_m.atan2(ahead_m),
-            s_m: s_m + step,
-            ahead_m,
-            aside_m,
-        }
+/// Where a point of the outline passes through a scan plane, by its slope at `s_m` in `section`.
+fn seen(
+    mesh: &Mesh,
+    plane: &ScanPlane,
+    across: &Vector3<f64>,
+    section: &Section,
+    vertex: usize,
+    s_m: f64,
+) -> View {
+    let local = local(mesh, section, vertex, 0.0);
+    let slope = section.turn * span_slope(mesh, section, vertex, 0.0, &local);
+    let point = section.place + section.turn * local;
+    let step = -across.dot(&(point - plane.origin)) / across.dot(&slope);
+    let to = point + slope * step - plane.origin;
+    let (ahead_m, aside_m) = (to.dot(&plane.ahead), to.dot(&plane.aside));
+    View {
+        angle: aside_m.atan2(ahead_m),
+        s_m: s_m + step,
+        ahead_m,
+        aside_m,
     }
 }
 
@@ -341,11 +342,16 @@ fn outline_at(mesh: &Mesh, node: usize, vertex: usize, along: f64) -> [f64; 2] {
     [a[0] + (b[0] - a[0]) * along, a[1] + (b[1] - a[1]) * along]
 }
 
-fn contact(mesh: &Mesh, section: Section, vertex: usize, along: f64) -> Contact {
+/// Point of the outline in the section's directions, metres.
+fn local(mesh: &Mesh, section: &Section, vertex: usize, along: f64) -> Vector3<f64> {
     let inner = outline_at(mesh, section.node, vertex, along);
     let outer = outline_at(mesh, section.node + 1, vertex, along);
     let blend = |k: usize| inner[k] + (outer[k] - inner[k]) * section.share;
-    let local = Vector3::new(blend(0), blend(1), 0.0);
+    Vector3::new(blend(0), blend(1), 0.0)
+}
+
+fn contact(mesh: &Mesh, section: Section, vertex: usize, along: f64) -> Contact {
+    let local = local(mesh, &section, vertex, along);
     let count = mesh.outline[0].len();
     let (x, next) = (&mesh.x_c[section.node], (vertex + 1) % count);
     let normal = outward(mesh, &section, vertex, along, &local);

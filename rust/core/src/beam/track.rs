@@ -2,13 +2,16 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::adjust::{Adjustment, Gates, Hold, Problem};
+use super::carry::{Knowledge, Spread};
 use super::echoes::Seen;
 use super::family::{self, Loading};
-use super::posed::knots;
-use super::rows::Tally;
+use super::layout::RANGES;
+use super::posed::{Posed, knots};
+use super::sections::Rests;
+use super::weights::Tally;
 use crate::error::BeamError;
 
 /// Time between two knots, nanoseconds.
@@ -17,8 +20,6 @@ const KNOT_NS: i64 = 100_000_000;
 const LOAD_SHARE: f64 = 0.02;
 /// Weight of what the holds on both sides tell of a state's own unknowns: it is known to a fifth.
 const OWN_TIGHTNESS: f64 = 25.0;
-/// Standard deviations of the sway while the load changes, metres at the tip.
-const SWAY_M: [f64; 4] = [0.15, 0.15, 0.04, 0.04];
 
 /// A stretch of time to follow.
 #[derive(Debug, Clone)]
@@ -29,6 +30,20 @@ pub struct Stretch {
     pub span_ns: (i64, i64),
     /// Load at its knots, share of full load; as many as [`load_knots`] gives.
     pub load: Vec<f64>,
+    /// Standard deviations of its sway in the first mode in x and y and in the second, metres at the tip.
+    pub sway_m: [f64; 4],
+}
+
+impl Stretch {
+    /// Mean load, share of full load.
+    fn middle(&self) -> f64 {
+        self.load.iter().sum::<f64>() / self.load.len().max(1) as f64
+    }
+
+    /// Where its load lies among those of the holds, see [`neighbours`].
+    pub fn between(&self, loads: &[f64]) -> (usize, usize, f64) {
+        neighbours(loads, self.middle())
+    }
 }
 
 /// Instants at which a stretch wants the load: one per knot.
@@ -44,7 +59,7 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Unsettled`] where the load has no equilibrium.
     pub fn stretch(&self, stretch: &Stretch, loads: &[f64]) -> Result<Adjustment, BeamError> {
-        let middle = stretch.load.iter().sum::<f64>() / stretch.load.len().max(1) as f64;
+        let middle = stretch.middle();
         let full_n = self.full_forces(loads);
         let hold = Hold {
             seen: stretch.seen.clone(),
@@ -62,7 +77,7 @@ impl Adjustment {
             trust: self.problem.trust,
             shape: self.problem.shape.clone(),
         };
-        let mut part = self.blank(problem);
+        let mut part = self.blank(problem, &stretch.sway_m);
         self.hand_down(&mut part, stretch, loads, middle);
         part.linearise()?;
         Ok(part)
@@ -82,15 +97,15 @@ impl Adjustment {
     }
 
     /// An adjustment of one hold with this one's lidars and weights, without values.
-    fn blank(&self, problem: Problem) -> Adjustment {
+    fn blank(&self, problem: Problem, sway_m: &[f64; 4]) -> Adjustment {
         let own = family::hold_unknowns(&problem.holds[0].loading, &problem.trust);
         let mut layout = self.layout.clone();
         layout.own = vec![own.len()];
         layout.knots = vec![knots(problem.holds[0].span_ns, KNOT_NS)];
-        layout.modes = SWAY_M.len() + 1;
+        layout.modes = sway_m.len() + 1;
         let free: Range<usize> = layout.shared..layout.lidar_at(0);
         let mut modes_m = vec![LOAD_SHARE];
-        modes_m.extend(SWAY_M);
+        modes_m.extend(sway_m);
         let mut blank = self.like(problem, layout);
         blank.free = free;
         blank.modes_m = modes_m;
@@ -111,7 +126,14 @@ impl Adjustment {
         part.values
             .rows_mut(to, count)
             .copy_from(&self.values.rows(from, count));
+        let ranges = RANGES * self.layout.channels.len();
+        part.values
+            .rows_mut(part.layout.range_at(0), ranges)
+            .copy_from(&self.values.rows(self.layout.range_at(0), ranges));
         let (low, high, share) = neighbours(loads, middle);
+        let loose = self.loose_edges().into_iter();
+        let loose = loose.filter(|found| [low, high].contains(&found.0));
+        part.muted = loose.map(|(_, lidar, side, _)| (lidar, side)).collect();
         for lidar in 0..self.layout.channels.len() {
             for side in 0..2 {
                 let of = |hold| self.values[self.layout.edge_offset_at(hold, lidar, side)];
@@ -135,56 +157,97 @@ impl Adjustment {
     }
 
     /// What became of the data, and states at instants: per instant and section x, y, z in metres and
-    /// the twist in rad since the first hold of `reference`, and the variances from noise alone.
+    /// the twist in rad since the first hold of `reference`, and how well they are known by what it
+    /// knows and by the data of the stretch. `between` is where the load lies, see [`neighbours`].
     ///
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn follow(
         &mut self,
-        reference: &Adjustment,
-        s_m: &[f64],
+        reference: (&Adjustment, &Knowledge),
+        between: (usize, usize, f64),
         times_ns: &[i64],
         gates: &[Gates],
     ) -> Result<Followed, BeamError> {
-        let mut tally = Tally::default();
-        for gate in gates {
-            tally = self.step(gate)?.tallies.pop().unwrap_or_default();
+        for gate in &gates[..gates.len() - 1] {
+            self.step(gate)?;
         }
-        let last = gates[gates.len() - 1];
-        let factor = self.normal(&last).0.solve().ok_or(BeamError::Singular)?.1;
+        let (normal, tally) = self.last_step(&gates[gates.len() - 1])?;
+        let factor = self.free_factor(&normal)?;
+        let (knowledge, posed) = (reference.1, self.posed(0));
+        let at = |time_ns: i64| self.states_at(&knowledge.rests, &posed, 0, time_ns);
+        let told = match times_ns.get(times_ns.len() / 2) {
+            Some(time_ns) => {
+                let rows = at(*time_ns).1;
+                reference
+                    .0
+                    .inherited(self, knowledge, between, (&normal, &factor), &rows)
+            }
+            None => Vec::new(),
+        };
         let mut found = Followed {
             tally,
             values: Vec::new(),
-            variances: Vec::new(),
+            spreads: Vec::new(),
         };
         for time_ns in times_ns {
-            let (values, rows) = self.states_at(reference, 0, s_m, *time_ns);
-            let free = rows.rows(self.free.start, self.free.len()).into_owned();
-            let spread = factor.solve(&free);
-            let variance = |k: usize| free.column(k).dot(&spread.column(k));
+            let (values, rows) = at(*time_ns);
+            let noise = self.noise(&factor, &rows);
+            let parts = told.iter().zip(noise);
             found
-                .variances
-                .extend((0..s_m.len()).map(|i| [0, 1, 2, 3].map(|k| variance(4 * i + k))));
+                .spreads
+                .extend(parts.map(|(told, (position, twist))| told.plus(&position, twist)));
             found.values.extend(values);
         }
         Ok(found)
     }
 
-    /// States of sections of one hold at an instant and their slopes by all unknowns.
-    pub fn states_at(
+    /// The last step, with the normal equations over all unknowns, whole, that led to it.
+    pub(super) fn last_step(&mut self, gates: &Gates) -> Result<(DMatrix<f64>, Tally), BeamError> {
+        let free = std::mem::replace(&mut self.free, 0..self.layout.len());
+        let (mut normal, mut tallies) = self.normal(gates);
+        self.free = free;
+        normal.matrix.fill_upper_triangle_with_lower_triangle();
+        let right = normal.right.rows(self.free.start, self.free.len());
+        let step = self.free_factor(&normal.matrix)?.solve(&right);
+        let mut at = self.values.rows_mut(self.free.start, self.free.len());
+        at += step;
+        Ok((normal.matrix, tallies.pop().unwrap_or_default()))
+    }
+
+    pub(super) fn free_factor(
         &self,
-        reference: &Adjustment,
+        normal: &DMatrix<f64>,
+    ) -> Result<Cholesky<f64, Dyn>, BeamError> {
+        let (first, count) = (self.free.start, self.free.len());
+        let block = normal.view((first, first), (count, count)).into_owned();
+        block.cholesky().ok_or(BeamError::Singular)
+    }
+
+    /// Covariance of the place and variance of the twist of each section by the data of the stretch.
+    fn noise(&self, factor: &Cholesky<f64, Dyn>, rows: &DMatrix<f64>) -> Vec<(Matrix3<f64>, f64)> {
+        let free = rows.rows(self.free.start, self.free.len()).into_owned();
+        let answer = factor.solve(&free);
+        let of = |k: usize| {
+            let block = free.columns(4 * k, 4).tr_mul(&answer.columns(4 * k, 4));
+            (block.fixed_view::<3, 3>(0, 0).into_owned(), block[(3, 3)])
+        };
+        (0..rows.ncols() / 4).map(of).collect()
+    }
+
+    /// States of sections of one hold at an instant and their slopes by all unknowns.
+    pub(super) fn states_at(
+        &self,
+        rests: &Rests,
+        posed: &Posed,
         hold: usize,
-        s_m: &[f64],
         time_ns: i64,
     ) -> (Vec<[f64; 4]>, DMatrix<f64>) {
-        let (posed, rest) = (self.posed(hold), reference.posed(0));
-        let mut rows = DMatrix::zeros(self.layout.len(), 4 * s_m.len());
-        let mut values = Vec::with_capacity(s_m.len());
-        for (i, s) in s_m.iter().enumerate() {
-            let place = self.place_at(&posed, hold, *s, Some(time_ns));
-            let rest = reference.place_at(&rest, 0, *s, None);
-            values.push(self.fill_state(&mut rows, 4 * i, &posed, hold, &place, &rest));
+        let mut rows = DMatrix::zeros(self.layout.len(), 4 * rests.s_m.len());
+        let mut values = Vec::with_capacity(rests.s_m.len());
+        for (k, (s_m, rest)) in rests.s_m.iter().zip(&rests.places).enumerate() {
+            let place = self.place_at(posed, hold, *s_m, Some(time_ns));
+            values.push(self.fill_state(&mut rows, 4 * k, posed, hold, &place, rest));
         }
         (values, rows)
     }
@@ -197,8 +260,8 @@ pub struct Followed {
     pub tally: Tally,
     /// By instant and section: x, y, z in metres, twist in rad.
     pub values: Vec<[f64; 4]>,
-    /// Their variances.
-    pub variances: Vec<[f64; 4]>,
+    /// How well they are known.
+    pub spreads: Vec<Spread>,
 }
 
 /// Holds whose loads lie on both sides of a load, and the share of the way between them.

@@ -18,6 +18,8 @@ const SHRINK: f64 = 1.0 - 1e-6;
 const MOST_STEPS: f64 = (1u64 << 28) as f64;
 /// Bits sorted in one pass.
 const DIGIT_BITS: u32 = 11;
+/// Points up to which sorting by comparison is faster.
+const FEW: usize = 256;
 /// Cells handed to a thread at once.
 const BLOCK: usize = 2048;
 
@@ -132,12 +134,14 @@ impl Walk<'_> {
         &self.runs
     }
 
-    /// The cells after `cell`, so that each pair of cells is met once, in the order of the cells.
+    /// Runs of the cells after `cell`, so that each pair of cells is met once, in the order of the cells.
     #[inline]
-    pub fn after(&mut self, cell: usize) -> impl Iterator<Item = usize> {
+    pub fn after(&mut self, cell: usize) -> impl Iterator<Item = Range<usize>> {
         let own = ROWS / 2; // steps ascend, the middle one is the row of the cell
-        let rows = (own..ROWS).flat_map(move |row| self.row(row, cell));
-        rows.skip_while(move |&other| other <= cell)
+        (own..ROWS).map(move |row| {
+            let run = self.row(row, cell);
+            run.start.max(cell + 1)..run.end
+        })
     }
 
     #[inline(always)]
@@ -214,7 +218,7 @@ fn bounds<T: Coordinate>(points: &[[T; 3]]) -> ([f64; 3], [f64; 3]) {
 
 /// Sorts by key, equal keys staying in order: digits from the lowest up.
 fn sort_by_key(entries: &mut Vec<(u64, u32)>, most_key: u64) {
-    if entries.len() < 1 << DIGIT_BITS {
+    if entries.len() < FEW {
         entries.sort_unstable();
         return;
     }
@@ -285,7 +289,7 @@ mod tests {
         let (mut met, mut pairs) = (0, 0);
         for cell in 0..343 {
             met += walk.around(cell).iter().map(Range::len).sum::<usize>();
-            pairs += after.after(cell).count();
+            pairs += after.after(cell).map(|run| run.len()).sum::<usize>();
         }
         let along = 3 + 4 + 5 + 5 + 5 + 4 + 3; // neighbours of 7 cells in a line
         assert_eq!(met, along * along * along);

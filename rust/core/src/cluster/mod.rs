@@ -2,6 +2,7 @@
 
 mod components;
 pub mod dbscan;
+mod graded;
 mod grid;
 pub mod line;
 pub mod radius;

@@ -125,11 +125,13 @@ impl<T: Coordinate> Scene<T> {
             let mut walk = self.grid.walk(block.start);
             for cell in block.filter(|&cell| has_core[cell]) {
                 let mut root = components.root(cell as u32);
-                for other in walk.after(cell).filter(|&other| has_core[other]) {
-                    let is_new = !components.is_under(root, other as u32);
-                    if is_new && self.cells_touch(cell, other, cores) {
-                        components.join(cell as u32, other as u32);
-                        root = components.root(root);
+                for run in walk.after(cell) {
+                    for other in run.filter(|&other| has_core[other]) {
+                        let is_new = !components.is_under(root, other as u32);
+                        if is_new && self.cells_touch(cell, other, cores) {
+                            components.join(cell as u32, other as u32);
+                            root = components.root(root);
+                        }
                     }
                 }
             }

@@ -1,4 +1,5 @@
-//! Clusters where every point has a radius of its own, by tree search.
+//! Clusters where every point has a radius of its own, by tree search: for radii so different that the cells
+//! of [`super::graded`] would be too large for most.
 
 use std::sync::atomic::{AtomicI32, Ordering::Relaxed};
 

@@ -46,6 +46,17 @@ pub fn wrapped(angle_rad: f64) -> f32 {
     if narrow >= TAU as f32 { 0.0 } else { narrow }
 }
 
+/// Any angle brought into [0, 2 pi) of `f32`; quickly where it is not far outside of one turn.
+#[inline(always)]
+pub fn wrapped_far(angle_rad: f64) -> f32 {
+    let is_near = (-TAU..2.0 * TAU).contains(&angle_rad);
+    wrapped(if is_near {
+        angle_rad
+    } else {
+        angle_rad.rem_euclid(TAU)
+    })
+}
+
 /// Sine and cosine of whole hundredths of a degree.
 static CENTIDEGREES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
     let angle = |number: u32| (f64::from(number) / 100.0).to_radians().sin_cos();
@@ -132,6 +143,10 @@ mod tests {
         }
         assert_eq!(wrapped(TAU - 1e-9), 0.0);
         assert_eq!(wrapped(TAU + 0.5), 0.5);
+        for step in -4000..4000 {
+            let angle = f64::from(step) * 0.01;
+            assert_eq!(wrapped_far(angle), wrapped(angle.rem_euclid(TAU)));
+        }
     }
 
     #[test]

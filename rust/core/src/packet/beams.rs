@@ -79,6 +79,17 @@ impl Beam {
     }
 }
 
+/// Whether elevations may be of a unit of a model with these: units differ from their model by tenths of a
+/// degree, models of as many lasers by degrees.
+pub fn is_near(told_rad: &[f64], model_rad: &[f64]) -> bool {
+    const MOST_DEG: f64 = 1.0;
+    let pairs = told_rad.iter().zip(model_rad);
+    let mut apart_rad: Vec<f64> = pairs.map(|(one, other)| (one - other).abs()).collect();
+    apart_rad.sort_by(f64::total_cmp);
+    let middle_rad = apart_rad.get(apart_rad.len() / 2);
+    middle_rad.is_none_or(|apart_rad| apart_rad.to_degrees() <= MOST_DEG)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -25,6 +25,8 @@ pub type Meanings = [Option<ReturnKind>; MOST];
 #[inline]
 pub fn judge(mode: ReturnMode, echoes: &[RawEcho]) -> (Meanings, u32) {
     match echoes {
+        [only] if only.range == 0 => ([None; MOST], 0),
+        [_] => ([Some(only_kind(mode, 0)), None, None], 0),
         [first, second] => judge_pair(mode, [*first, *second]),
         _ => judge_several(mode, echoes),
     }
@@ -198,6 +200,24 @@ mod tests {
         let two = kinds(ReturnMode::Triple, &[(5, 9), (5, 9), (8, 1)]);
         assert_eq!(two, ([Some(Merged), None, Some(Last)], 1));
     }
+
+    #[test]
+    fn one_echo_is_judged_as_any_number_is() {
+        let modes = [
+            ReturnMode::Last,
+            ReturnMode::First,
+            ReturnMode::Second,
+            ReturnMode::Dual,
+        ];
+        for (mode, range) in modes.iter().flat_map(|mode| [(*mode, 0), (*mode, 5)]) {
+            let echo = [RawEcho {
+                range,
+                intensity: 7,
+            }];
+            assert_eq!(judge(mode, &echo), judge_several(mode, &echo));
+        }
+    }
+
     #[test]
     fn two_echoes_are_judged_as_any_number_is() {
         let modes = [

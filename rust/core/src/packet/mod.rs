@@ -17,6 +17,7 @@ pub mod points;
 pub mod proof;
 pub mod robosense;
 pub mod split;
+mod strangers;
 pub mod unit;
 pub mod velodyne;
 pub mod writer;
@@ -29,6 +30,7 @@ use crate::frame::Sensor;
 use crate::loss::cycle::Restarts;
 use crate::time::{NANOS_PER_HOUR, Timestamp};
 pub use models::{MODELS, claimants, closest, companion, model, unit_models};
+pub use robosense::solid::joined::pieces;
 use split::{Following, Split};
 use unit::{Fitted, Gather, UnitFacts, UnitFile};
 
@@ -180,6 +182,19 @@ pub enum PacketKind {
     Inertial,
     /// Tells the state of the sensor or of what it watches.
     Status,
+}
+
+impl PacketKind {
+    /// For reports.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Data => "data",
+            Self::Position => "position packets",
+            Self::Metadata => "packets that describe the unit",
+            Self::Inertial => "packets of accelerations and turn rates",
+            Self::Status => "packets of the sensor's state",
+        }
+    }
 }
 
 /// How a sensor numbers and stamps its packets.
@@ -421,5 +436,11 @@ pub trait Decoder: Send + Sync {
         out: &mut Decoded,
     ) {
         self.decode(payload, place, out);
+    }
+
+    /// Whether a return of `payload` may lie in a direction within `bearings`, counted from x towards y,
+    /// half a metre or farther from the z axis. A decoder that cannot tell says that it may.
+    fn may_meet(&self, _payload: &[u8], _bearings: Arc) -> bool {
+        true
     }
 }

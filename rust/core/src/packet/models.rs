@@ -1,5 +1,6 @@
 //! The list of all models, and how one is found by its name or by what it is sent.
 
+use super::strangers::stranger;
 use super::unit::UnitFile;
 use super::{
     Misfit, ModelRef, PacketKind, hesai, leishen, livox, ouster, points, robosense, velodyne,
@@ -97,6 +98,7 @@ pub static MODELS: &[ModelRef] = &[
     &leishen::mirror::MODELS[7],
     &robosense::solid::sensor::M1,
     &robosense::solid::sensor::M1_PLUS,
+    &robosense::solid::sensor::M1_JUMBO,
     &robosense::solid::sensor::M2,
     &robosense::solid::sensor::M3,
     &robosense::solid::sensor::MX,
@@ -139,6 +141,28 @@ const ALIASES: &[(&str, &str)] = &[
     ("rshelios16p", "helios16p"),
     ("rshelios", "helios32"),
     ("rubylite", "ruby-80"),
+    ("rubyrs128", "ruby-128"),
+    ("rubyrs80", "ruby-80"),
+    ("rubyrs48", "ruby-48"),
+    ("rubyplusp128", "ruby-plus-128"),
+    ("rubyplusp80", "ruby-plus-80"),
+    ("rubyplusp48", "ruby-plus-48"),
+    ("pandar128e4x", "ot128"),
+    ("ft120c1x", "ft120"),
+    ("qt128c2x", "qt128"),
+    ("at128e2x", "at128"),
+];
+
+/// Makers whose name may stand before that of the product, in the spelling of [`squeezed`].
+const MAKERS: &[&str] = &[
+    "velodyne",
+    "hesai",
+    "robosense",
+    "rs",
+    "ouster",
+    "livox",
+    "leishen",
+    "lslidar",
 ];
 
 /// A name without the dashes, spaces and capitals in which spellings differ.
@@ -153,14 +177,23 @@ fn squeezed(name: &str) -> String {
 /// [`InvalidValue`] that lists the known ids.
 pub fn model(id: &str) -> Result<ModelRef, InvalidValue> {
     let name = squeezed(id);
-    let alias = ALIASES.iter().find(|(other, _)| *other == name);
-    let name = alias.map_or(name, |(_, id)| squeezed(id));
-    let known = MODELS.iter().find(|model| squeezed(model.id()) == name);
-    known.copied().ok_or_else(|| InvalidValue {
+    let without = MAKERS.iter().filter_map(|maker| name.strip_prefix(maker));
+    let known = std::iter::once(name.as_str())
+        .chain(without)
+        .find_map(named);
+    known.ok_or_else(|| InvalidValue {
         name: "sensor model",
         expected: MODELS.iter().map(|m| m.id()).collect::<Vec<_>>().join(", "),
         found: id.into(),
     })
+}
+
+/// The model with this id or older name, in the spelling of [`squeezed`].
+fn named(name: &str) -> Option<ModelRef> {
+    let alias = ALIASES.iter().find(|(other, _)| *other == name);
+    let name = alias.map_or_else(|| name.to_owned(), |(_, id)| squeezed(id));
+    let known = MODELS.iter().find(|model| squeezed(model.id()) == name);
+    known.copied()
 }
 
 /// Models that claim `payload` as their data packet, the likelier one first.
@@ -174,14 +207,18 @@ pub fn unit_models(files: &[UnitFile]) -> Vec<ModelRef> {
     MODELS.iter().flat_map(|model| model.units(files)).collect()
 }
 
-/// What `payload` is beside data, if any model knows.
-pub fn companion(payload: &[u8]) -> Option<PacketKind> {
-    let mut kinds = MODELS.iter().filter_map(|model| model.recognise(payload));
-    kinds.find(|kind| *kind != PacketKind::Data)
+/// What `payload` is beside data and whose, if any model knows.
+pub fn companion(payload: &[u8]) -> Option<(ModelRef, PacketKind)> {
+    let known = |model: &ModelRef| Some((*model, model.recognise(payload)?));
+    let mut kinds = MODELS.iter().filter_map(known);
+    kinds.find(|(_, kind)| *kind != PacketKind::Data)
 }
 
-/// How close a packet that nobody claims comes to a known model.
+/// What a packet that nobody claims is, as far as its format is known, else how close it comes to a model.
 pub fn closest(payload: &[u8]) -> Option<Misfit> {
+    if let Some(misfit) = stranger(payload) {
+        return Some(misfit);
+    }
     let model = MODELS.iter().find(|model| model.fits(payload))?;
     Some(model.misfit(payload))
 }
@@ -212,5 +249,12 @@ mod tests {
         }
         assert_eq!(model("helios-16p").unwrap().id(), "helios16p");
         assert_eq!(model("RS-16").unwrap().id(), "rs16");
+        assert_eq!(model("rs-m1").unwrap().id(), "m1");
+        assert_eq!(model("Hesai PandarXT-32").unwrap().id(), "xt32");
+        assert_eq!(
+            model("robosense_ruby_plus_p128").unwrap().id(),
+            "ruby-plus-128"
+        );
+        assert!(model("rs-m9").is_err());
     }
 }

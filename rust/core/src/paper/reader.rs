@@ -47,14 +47,14 @@ impl FramePlan {
         }
     }
 
-    fn options(&self, place: usize) -> SweepOptions {
+    fn options(&self, place: usize, stands: &Stands) -> SweepOptions {
+        let lidars = &self.lidars[place..=place];
+        let bearings = std::iter::once(self.pass.bearings(stands));
         SweepOptions {
             start: Some(self.start),
             stop: Some(self.stop),
-            ..SweepOptions::of(
-                &self.lidars[place..=place],
-                &self.cut_azimuth_rad[place..=place],
-            )
+            ..SweepOptions::of(lidars, &self.cut_azimuth_rad[place..=place])
+                .towards(lidars, bearings)
         }
     }
 }
@@ -84,7 +84,7 @@ impl FrameReader {
         let stands = Stands::of(&plan.poses, &plan.moves)?;
         let lane = |place: usize| {
             Ok(Lane {
-                reader: SweepReader::new(report, &plan.options(place))?,
+                reader: SweepReader::new(report, &plan.options(place, &stands[place]))?,
                 stands: stands[place].clone(),
                 shares: Vec::new(),
             })

@@ -6,7 +6,7 @@ use std::net::IpAddr;
 use super::arrivals::{Arrivals, mark};
 use super::reader::SweepOptions;
 use super::report::ScanReport;
-use super::{ScanOptions, StreamKey};
+use super::{ScanOptions, StreamKey, packets};
 use crate::capture::Datagram;
 use crate::clock::ClockModel;
 use crate::packet::ModelRef;
@@ -53,8 +53,11 @@ impl CaptureCut {
         }
     }
 
-    /// Whether the next datagram of the capture belongs to the cut.
+    /// Whether the next datagram of the capture belongs to the cut; one that joins packets by its first.
     pub fn wants(&mut self, datagram: &Datagram<'_>) -> bool {
+        let whole = datagram;
+        let first = packets(whole).next();
+        let datagram = first.as_ref().unwrap_or(whole);
         let time = match self.lanes.get_mut(&self.options.key(datagram)) {
             Some(lane) => lane.time(datagram),
             None if self.addresses.contains(&datagram.source.ip()) => datagram.time,

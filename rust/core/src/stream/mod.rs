@@ -18,7 +18,7 @@ use std::net::{IpAddr, SocketAddr};
 use crate::capture::Datagram;
 use crate::error::InvalidValue;
 use crate::packet::unit::UnitFile;
-use crate::packet::{ModelRef, unit_models};
+use crate::packet::{ModelRef, pieces, unit_models};
 
 pub use cut::CaptureCut;
 pub use points::{PointBlock, PointReader, PointTagger};
@@ -148,6 +148,20 @@ impl ScanOptions {
         let named = self.models.iter().find(|(source, _)| source.matches(key));
         named.map(|(_, model)| *model)
     }
+}
+
+/// A datagram's packets: itself, but for one that joins several.
+fn packets<'a>(datagram: &Datagram<'a>) -> impl Iterator<Item = Datagram<'a>> {
+    let (pieces, whole) = match pieces(datagram.payload) {
+        Some(pieces) => (Some(pieces), None),
+        None => (None, Some(datagram.payload)),
+    };
+    let payloads = pieces.into_iter().flatten().chain(whole);
+    let datagram = *datagram;
+    payloads.map(move |payload| Datagram {
+        payload,
+        ..datagram
+    })
 }
 
 #[cfg(test)]

@@ -4,7 +4,8 @@ use std::collections::{HashMap, VecDeque};
 
 use super::arrivals::{Arrival, Arrivals, Ordered, mark};
 use super::report::{Pause, ScanReport, StreamInfo};
-use super::{ScanOptions, StreamKey};
+use super::{ScanOptions, StreamKey, packets};
+use crate::angle::Arc;
 use crate::capture::Datagram;
 use crate::clock::ClockModel;
 use crate::cloud::PointCloud;
@@ -24,6 +25,8 @@ pub struct SweepOptions {
     pub lidars: Option<Vec<usize>>,
     /// Azimuths at which sweeps are cut, by number of the lidar; 0 where there is none.
     pub cut_azimuth_rad: Vec<f64>,
+    /// Bearings in the sensor frame, by number of the lidar: returns outside may be left out, for speed.
+    pub bearings: Vec<Option<Arc>>,
     /// Packets before this are left out.
     pub start: Option<Timestamp>,
     /// Packets from this on are left out.
@@ -42,6 +45,19 @@ impl SweepOptions {
             cut_azimuth_rad: by_number,
             ..Self::default()
         }
+    }
+
+    /// The same where of each of these lidars only returns within its bearings are wanted.
+    pub fn towards(
+        mut self,
+        lidars: &[usize],
+        bearings: impl Iterator<Item = Option<Arc>>,
+    ) -> Self {
+        self.bearings = vec![None; lidars.iter().max().map_or(0, |last| last + 1)];
+        for (number, bearings) in lidars.iter().zip(bearings) {
+            self.bearings[*number] = bearings;
+        }
+        self
     }
 }
 
@@ -90,6 +106,7 @@ struct Lane<S> {
     decoder: Box<dyn Decoder>,
     clock: ClockModel,
     view: FieldOfView,
+    bearings: Option<Arc>,
     sink: S,
     spare: Vec<Vec<u8>>,
     /// A packet whose last firing may go on in the next one.
@@ -129,6 +146,12 @@ impl<S: Sink> Reader<S> {
 
     /// Takes the next datagram.
     pub fn push(&mut self, datagram: &Datagram<'_>) {
+        for packet in packets(datagram) {
+            self.take_packet(&packet);
+        }
+    }
+
+    fn take_packet(&mut self, datagram: &Datagram<'_>) {
         let key = self.options.key(datagram);
         let Some(lane) = self.lanes.get_mut(&key).filter(|lane| !lane.is_done) else {
             return;
@@ -196,6 +219,7 @@ impl<S: Sink> Lane<S> {
             decoder: info.model.fit(&info.unit)?.decoder,
             clock: info.clock.clone(),
             view: info.view.clone(),
+            bearings: options.bearings.get(number).copied().flatten(),
             sink: S::new(number, cut_rad, visible_rad),
             spare: Vec::new(),
             held: None,
@@ -285,9 +309,16 @@ impl<S: Sink> Lane<S> {
             packet: ticket.packet,
             mean_rate_rad_per_ns: ticket.mean_rate_rad_per_ns,
         };
-        self.decoder
-            .decode_before(payload, following, place, step.decoded);
+        if self.is_wanted(payload) {
+            self.decoder
+                .decode_before(payload, following, place, step.decoded);
+        }
         self.sink.push(&placed, step.decoded, step.out);
+    }
+
+    fn is_wanted(&self, payload: &[u8]) -> bool {
+        let meets = |bearings: Arc| self.decoder.may_meet(payload, bearings);
+        self.bearings.is_none_or(meets)
     }
 
     fn finish(&mut self, step: &mut Step<'_, S::Out>) {

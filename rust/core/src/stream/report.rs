@@ -124,6 +124,8 @@ pub struct OtherStream {
     pub packets: u64,
     /// Of those position packets of a lidar.
     pub positions: u64,
+    /// Of those packets that describe a unit, its motion or its state.
+    pub companions: u64,
     /// Size of the first datagram's payload.
     pub payload_len: usize,
     /// Datagrams a second.
@@ -195,6 +197,18 @@ impl ScanReport {
             }
         }
         Ok(())
+    }
+
+    /// Files that lay beside the capture and that no lidar takes.
+    pub fn unused_units(&self) -> impl Iterator<Item = &UnitFile> {
+        let beside = self.options.units.iter().filter(|given| !given.is_named);
+        let is_taken = |given: &&super::Given| {
+            let mut lidars = self.lidars.iter();
+            lidars.any(|lidar| given.is_for(&lidar.key) && lidar.model.takes(&given.file))
+        };
+        beside
+            .filter(move |given| !is_taken(given))
+            .map(|given| &given.file)
     }
 
     /// Counts of every second from the first packet on, by second and lidar.

@@ -5,12 +5,12 @@ use std::collections::HashMap;
 use super::lidar::{Lidar, Shared};
 use super::probe::Probe;
 use super::report::{OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
-use super::{ScanOptions, StreamKey};
+use super::{ScanOptions, StreamKey, packets};
 use crate::capture::Datagram;
 use crate::drops::Drops;
 use crate::packet::unit::UnitFile;
 use crate::packet::velodyne::position::{Position, Pps};
-use crate::packet::{Misfit, PacketKind, closest, companion};
+use crate::packet::{Misfit, ModelRef, PacketKind, closest, companion};
 use crate::time::{NANOS_PER_SECOND, Timestamp};
 
 /// Silence of the whole capture for longer than this is a pause of the recording, not loss.
@@ -47,6 +47,8 @@ struct Stream {
     metadata: Option<UnitFile>,
     /// Packets that describe a unit, its motion or its state.
     companions: u64,
+    /// What of a lidar the last packet beside data was.
+    companion: Option<(ModelRef, PacketKind)>,
 }
 
 #[derive(Debug)]
@@ -68,8 +70,14 @@ impl Scan {
         }
     }
 
-    /// Takes the next datagram.
+    /// Takes the next datagram; one that joins packets counts as many.
     pub fn push(&mut self, datagram: &Datagram<'_>) {
+        for packet in packets(datagram) {
+            self.take_packet(&packet);
+        }
+    }
+
+    fn take_packet(&mut self, datagram: &Datagram<'_>) {
         self.datagrams += 1;
         self.note_pause(datagram.time);
         let key = self.options.key(datagram);
@@ -183,6 +191,7 @@ impl Stream {
             position: None,
             metadata: None,
             companions: 0,
+            companion: None,
         }
     }
 
@@ -220,7 +229,9 @@ impl Stream {
 
     /// Takes what is not data and yet of a lidar.
     fn take_companion(&mut self, datagram: &Datagram<'_>) -> bool {
-        let kind = companion(datagram.payload);
+        let found = companion(datagram.payload);
+        self.companion = found.or(self.companion);
+        let kind = found.map(|(_, kind)| kind);
         let is_counted = !matches!(kind, None | Some(PacketKind::Data | PacketKind::Position));
         self.companions += u64::from(is_counted);
         match kind {
@@ -299,14 +310,23 @@ impl Stream {
             key,
             packets: self.packets,
             positions: self.position.as_ref().map_or(0, |facts| facts.packets),
+            companions: self.companions,
             payload_len: self.payload_len,
             rate_hz: if seconds > 0.0 {
                 (self.packets - 1) as f64 / seconds
             } else {
                 0.0
             },
-            closest: self.closest.clone(),
+            closest: self.closest.clone().or_else(|| self.beside_data()),
         }
+    }
+
+    /// That the stream has something of a lidar, yet no data.
+    fn beside_data(&self) -> Option<Misfit> {
+        let (model, kind) = self.companion?;
+        let vendor = model.title().split(' ').next().unwrap_or_default();
+        let why = format!("{} of {vendor}, which carry no points", kind.describe());
+        Some(Misfit { why, may_be: None })
     }
 }
 

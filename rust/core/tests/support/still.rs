@@ -377,8 +377,8 @@ fn solid(model: &'static Solid, make: Make, modes: &[(ReturnMode, &'static str)]
     let em4 = UnitFile::new("difop2", encode_em4(&pitches, &zones, &EM4_SURFACE));
     Writer {
         model,
-        files: Vec::from_iter((model.id() == "rs-em4").then_some(em4)),
-        is_told: model.id() != "rs-m1-plus",
+        files: Vec::from_iter((model.id() == "em4").then_some(em4)),
+        is_told: model.id() != "m1-plus",
         settings: settings.collect(),
     }
 }
@@ -431,6 +431,11 @@ pub fn writers() -> Vec<Writer> {
         ),
         solid(&solid::M1_PLUS, blocks_setting, &[(Strongest, "m1 plus")]),
         solid(
+            &solid::M1_JUMBO,
+            blocks_setting,
+            &[(Strongest, "m1 jumbo"), (Dual, "m1 jumbo dual")],
+        ),
+        solid(
             &solid::M2,
             blocks_setting,
             &[(Strongest, "m2"), (Dual, "m2 dual")],
@@ -453,4 +458,14 @@ pub fn writers() -> Vec<Writer> {
             &[(Strongest, "em4"), (FirstSecond, "em4 dual")],
         ),
     ]
+}
+
+/// Something in every shot.
+pub fn steady(shot: usize, echo: usize) -> Seen {
+    Seen {
+        range_m: (5 + shot % 90 + 20 * echo) as f64,
+        yaw_rad: 0.01 * (shot % 50) as f64,
+        pitch_rad: 0.02,
+        brightness: shot as u8,
+    }
 }

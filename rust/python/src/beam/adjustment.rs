@@ -1,11 +1,14 @@
 //! The adjustment of all holds, step by step.
 
+use std::sync::atomic::Ordering;
+
 use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem, Stage};
+use lidar_deflect_core::beam::carry::{Knowledge, Spread};
 use lidar_deflect_core::beam::family::{Loading, Trust};
 use lidar_deflect_core::beam::rig::Rig;
-use lidar_deflect_core::beam::rows::{Tally, Used, Weights};
 use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
 use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
+use lidar_deflect_core::beam::weights::{EdgeMet, Tally, Used, Weights};
 use lidar_deflect_core::error::InvalidValue;
 use lidar_deflect_core::frame::WorldFromSensor;
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -19,15 +22,24 @@ use rayon::prelude::*;
 use super::blade::BeamBlade;
 use super::seen::BeamSeen;
 use crate::arrays;
-use crate::compute::compute;
+use crate::compute::{compute, compute_until};
 use crate::error::BorderResult;
 
 /// Holds, blade and lidars in one adjustment.
 #[pyclass(module = "lidar_deflect._native")]
 pub struct BeamAdjustment {
     core: Adjustment,
+    /// Of the sections asked for last.
+    knowledge: Option<Knowledge>,
     threads: Option<usize>,
 }
+
+/// States, their spreads and what became of the data.
+type Told<'py> = (
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyArray2<f64>>,
+    Bound<'py, PyDict>,
+);
 
 #[pymethods]
 impl BeamAdjustment {
@@ -51,8 +63,8 @@ impl BeamAdjustment {
         rig_prior: PyReadonlyArray1<'_, f64>,
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
-        trust: [f64; 5],
-        shape_trust: [f64; 6],
+        trust: [f64; 6],
+        shape_trust: [f64; 7],
         noise_m: f64,
         surface_m: f64,
         edge_rad: f64,
@@ -78,7 +90,7 @@ impl BeamAdjustment {
                     .sum(),
             },
         };
-        let [stiffness, weight, prebend, free_rad_m, root_rad] = trust;
+        let [stiffness, weight, prebend, free_rad_m, root_rad, coupling] = trust;
         let [
             chord,
             chord_waves,
@@ -86,6 +98,7 @@ impl BeamAdjustment {
             twist_waves_rad,
             axis_fraction,
             waves_m,
+            slow_knot_m,
         ] = shape_trust;
         let shape = ShapeTrust {
             chord,
@@ -94,6 +107,7 @@ impl BeamAdjustment {
             twist_waves_rad,
             axis_fraction,
             waves_m,
+            slow_knot_m,
         };
         let problem = Problem {
             mesh: blade.mesh.clone(),
@@ -104,6 +118,7 @@ impl BeamAdjustment {
                 prebend,
                 free_rad_m,
                 root_rad,
+                coupling,
             },
             shape: Shape::new(&blade.mesh, shape, from_m),
             full_n: full_n
@@ -122,6 +137,7 @@ impl BeamAdjustment {
             surface_m,
             edge_rad,
             echoes,
+            common: Vec::new(),
         };
         let rig = Rig::new(
             poses?,
@@ -133,7 +149,11 @@ impl BeamAdjustment {
             DMatrix::from_fn(rows, columns, |i, j| covariance[(i, j)]),
         )?;
         let core = compute(py, threads, || Adjustment::new(problem, rig, weights))??;
-        Ok(Self { core, threads })
+        Ok(Self {
+            core,
+            knowledge: None,
+            threads,
+        })
     }
 
     /// Solves the equilibria of all holds anew.
@@ -150,6 +170,7 @@ impl BeamAdjustment {
         edge_m: f64,
         stage: &str,
     ) -> BorderResult<Bound<'py, PyDict>> {
+        self.knowledge = None;
         let core = &mut self.core;
         let gates = Gates {
             echo_m,
@@ -162,13 +183,15 @@ impl BeamAdjustment {
         let holds: PyResult<Vec<_>> = step.tallies.iter().map(|t| tally(py, t)).collect();
         told.set_item("holds", holds?)?;
         told.set_item("noise_m", self.core.weights.noise_m.clone())?;
+        told.set_item("surface_m", self.core.weights.surface_m)?;
         Ok(told)
     }
 
-    /// Values (holds * sections, 4) and joint covariance of x, y, z, twist of the sections.
+    /// Values (holds * sections, 4) and joint covariance of x, y, z, twist of the sections, to which
+    /// `states` and `follow` keep from then on.
     #[allow(clippy::type_complexity)] // the two that Python unpacks
     fn sections<'py>(
-        &self,
+        &mut self,
         py: Python<'py>,
         s_m: Vec<f64>,
         echo_m: f64,
@@ -179,7 +202,9 @@ impl BeamAdjustment {
             edge_m,
             stage: Stage::All,
         };
-        let found = compute(py, self.threads, || self.core.sections(&s_m, &gates))??;
+        let core = &self.core;
+        let (found, knowledge) = compute(py, self.threads, || core.knowledge(&s_m, &gates))??;
+        self.knowledge = Some(knowledge);
         let count = found.covariance.nrows();
         let values = found.values.as_flattened().to_vec();
         let covariance = found.covariance.as_slice().to_vec();
@@ -189,18 +214,23 @@ impl BeamAdjustment {
         ))
     }
 
-    /// States of the sections within a hold at instants, (times * sections, 4), and their variances.
+    /// States of the sections within a hold at instants, (times * sections, 4), and their spreads
+    /// (times * sections, 13): covariance of x, y, z as xx, yy, zz, xy, xz, yz, the same of the
+    /// deflection from the first hold, variance of the twist; beyond the first `each` sections those
+    /// of the middle instant.
+    #[allow(clippy::type_complexity)] // the two that Python unpacks
     fn states<'py>(
         &self,
         py: Python<'py>,
         hold: usize,
-        s_m: Vec<f64>,
         times_ns: Vec<i64>,
-    ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
-        let at = |time: &i64| self.core.states_at(&self.core, hold, &s_m, *time).0;
-        let values: Vec<[f64; 4]> =
-            compute(py, self.threads, || times_ns.iter().flat_map(at).collect())?;
-        Ok(arrays::rows(py, values)?)
+        each: usize,
+    ) -> BorderResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let (core, knowledge) = (&self.core, self.known()?);
+        let (values, spreads) = compute(py, self.threads, || {
+            core.instants(knowledge, hold, &times_ns, each)
+        })?;
+        Ok((arrays::rows(py, values)?, spread_rows(py, &spreads)?))
     }
 
     /// Instants at which `follow` wants the load of a stretch of time.
@@ -210,8 +240,9 @@ impl BeamAdjustment {
     }
 
     /// Follows stretches of time (what was seen, span, load at its knots, instants): per stretch the
-    /// states (times * sections, 4), their variances from noise, and what became of the data.
-    #[allow(clippy::type_complexity, clippy::too_many_arguments)] // keywords of Python, what it unpacks
+    /// states (times * sections, 4), their spreads as in `states`, and what became of the data; `None`
+    /// where the blade was not found.
+    #[allow(clippy::too_many_arguments)] // keywords of Python
     fn follow<'py>(
         &self,
         py: Python<'py>,
@@ -219,18 +250,10 @@ impl BeamAdjustment {
         spans_ns: Vec<(i64, i64)>,
         loads: Vec<Vec<f64>>,
         times_ns: Vec<Vec<i64>>,
-        s_m: Vec<f64>,
         hold_loads: Vec<f64>,
         gates: Vec<(f64, f64)>,
-    ) -> BorderResult<
-        Vec<
-            Option<(
-                Bound<'py, PyArray2<f64>>,
-                Bound<'py, PyArray2<f64>>,
-                Bound<'py, PyDict>,
-            )>,
-        >,
-    > {
+        sway_m: [f64; 4],
+    ) -> BorderResult<Vec<Option<Told<'py>>>> {
         let stretches: Vec<Stretch> = seen
             .iter()
             .zip(spans_ns.iter().zip(&loads))
@@ -238,6 +261,7 @@ impl BeamAdjustment {
                 seen: seen.seen.clone(),
                 span_ns: *span,
                 load: load.clone(),
+                sway_m,
             })
             .collect();
         let gates: Vec<Gates> = gates
@@ -248,23 +272,23 @@ impl BeamAdjustment {
                 stage: Stage::All,
             })
             .collect();
-        let core = &self.core;
+        let reference = (&self.core, self.known()?);
         let follow = |(stretch, times): (&Stretch, &Vec<i64>)| {
-            let mut part = core.stretch(stretch, &hold_loads).ok()?;
-            part.follow(core, &s_m, times, &gates).ok()
+            let mut part = reference.0.stretch(stretch, &hold_loads).ok()?;
+            let between = stretch.between(&hold_loads);
+            part.follow(reference, between, times, &gates).ok()
         };
-        let found: Vec<_> = compute(py, self.threads, || {
-            stretches
-                .par_iter()
-                .zip(times_ns.par_iter())
-                .map(follow)
+        let found: Vec<_> = compute_until(py, self.threads, |stop| {
+            let goes_on = |_: &_| !stop.load(Ordering::Relaxed);
+            let both = stretches.par_iter().zip(times_ns.par_iter());
+            both.map(|both| goes_on(&both).then(|| follow(both)).flatten())
                 .collect()
         })?;
         let hand = |followed: Option<Followed>| -> PyResult<_> {
             let Some(f) = followed else { return Ok(None) };
             let parts = (
                 arrays::rows(py, f.values)?,
-                arrays::rows(py, f.variances)?,
+                spread_rows(py, &f.spreads)?,
                 tally(py, &f.tally)?,
             );
             Ok(Some(parts))
@@ -282,6 +306,75 @@ impl BeamAdjustment {
         values.into_pyarray(py)
     }
 
+    /// Names of what values rest on, and the variance that each gives to x, y, z, the changes dx, dy, dz
+    /// and d since the first hold, and the twist, (groups, holds * sections * 8).
+    fn budget<'py>(
+        &self,
+        py: Python<'py>,
+        s_m: Vec<f64>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.budget(&s_m, &gates))??;
+        let names = found.groups.iter().map(|group| group.0).collect();
+        let values = found.groups.into_iter().flat_map(|group| group.1).collect();
+        let count = 8 * s_m.len() * self.core.problem.holds.len();
+        Ok((names, arrays::table(py, values, count)?))
+    }
+
+    /// By unknown: its group, by how much the data moved it, its standard deviation before and after.
+    #[allow(clippy::type_complexity)] // the two that Python unpacks
+    fn posterior<'py>(
+        &self,
+        py: Python<'py>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.posterior(&gates))??;
+        let names = found.iter().map(|known| known.0).collect();
+        let values = found.iter().flat_map(|known| known.1).collect();
+        Ok((names, arrays::table(py, values, 3)?))
+    }
+
+    /// Free axial strain of every hold, as if nothing kept its length, and the joint covariance.
+    #[allow(clippy::type_complexity)] // the two that Python unpacks
+    fn strains<'py>(
+        &self,
+        py: Python<'py>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let gates = last_gates(echo_m, edge_m);
+        let (strain, covariance) = compute(py, self.threads, || self.core.strains(&gates))??;
+        let count = strain.len();
+        Ok((
+            strain.as_slice().to_vec().into_pyarray(py),
+            arrays::table(py, covariance.as_slice().to_vec(), count)?,
+        ))
+    }
+
+    /// Outlines of the sections in every hold, (holds * sections * points, 4): x, y, z in metres and
+    /// the standard deviation along the normal.
+    fn outlines<'py>(
+        &self,
+        py: Python<'py>,
+        s_m: Vec<f64>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
+        let gates = last_gates(echo_m, edge_m);
+        let found = compute(py, self.threads, || self.core.outlines(&s_m, &gates))??;
+        Ok(arrays::rows(py, found)?)
+    }
+
+    /// Edges that end where the silhouette is not: hold, lidar, side (0 leading, 1 trailing edge), and
+    /// how far outside of it, rad.
+    fn loose_edges(&self) -> Vec<(usize, usize, usize, f64)> {
+        self.core.loose_edges()
+    }
+
     /// Where groups of unknowns start.
     fn layout<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let layout = &self.core.layout;
@@ -296,9 +389,33 @@ impl BeamAdjustment {
     }
 }
 
+impl BeamAdjustment {
+    fn known(&self) -> Result<&Knowledge, InvalidValue> {
+        self.knowledge.as_ref().ok_or_else(|| InvalidValue {
+            name: "sections",
+            expected: "asked for after the last step".into(),
+            found: "states before them".into(),
+        })
+    }
+}
+
+/// Rows of 13 as `states` tells.
+fn spread_rows<'py>(py: Python<'py>, spreads: &[Spread]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    const PLACES: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+    let of = |spread: &Spread| {
+        let both = [spread.position, spread.deflection];
+        let entries = both
+            .into_iter()
+            .flat_map(|block| PLACES.map(|place| block[place]));
+        entries.chain([spread.twist]).collect::<Vec<f64>>()
+    };
+    arrays::table(py, spreads.iter().flat_map(of).collect(), 13)
+}
+
 fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
     let told = met(py, &tally.used)?;
-    told.set_item("edges", tally.edges.clone())?;
+    let edge = |e: &EdgeMet| (e.lidar, e.side, e.residual_rad / e.step_rad);
+    told.set_item("edges", tally.edges.iter().map(edge).collect::<Vec<_>>())?;
     told.set_item("missed", tally.missed)?;
     told.set_item("rejected", met(py, &tally.rejected)?)?;
     told.set_item("unfit", tally.unfit)?;
@@ -317,6 +434,7 @@ fn met<'py>(py: Python<'py>, echoes: &[Used]) -> PyResult<Bound<'py, PyDict>> {
         "residual_m",
         column(py, echoes.iter().map(|e| e.residual_m)),
     )?;
+    told.set_item("chord", column(py, echoes.iter().map(|e| e.chord)))?;
     let points: Vec<[f64; 3]> = echoes.iter().map(|e| e.point.into()).collect();
     told.set_item("xyz_m", arrays::rows(py, points)?)?;
     Ok(told)
@@ -327,6 +445,14 @@ fn column<T: numpy::Element>(
     values: impl Iterator<Item = T>,
 ) -> Bound<'_, PyArray1<T>> {
     values.collect::<Vec<T>>().into_pyarray(py)
+}
+
+fn last_gates(echo_m: f64, edge_m: f64) -> Gates {
+    Gates {
+        echo_m,
+        edge_m,
+        stage: Stage::All,
+    }
 }
 
 fn stage_named(name: &str) -> Result<Stage, InvalidValue> {

@@ -74,6 +74,7 @@ impl BeamFeed {
             start: windows_ns.iter().map(|w| Timestamp(w.0)).min(),
             stop: windows_ns.iter().map(|w| Timestamp(w.1)).max(),
             ..SweepOptions::of(&lidars, &cuts_rad)
+                .towards(&lidars, stands.iter().map(|own| pass.bearings(own)))
         };
         Ok(Self {
             feed: Feed::open(py, &scan.paths)?,

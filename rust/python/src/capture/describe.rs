@@ -23,6 +23,11 @@ pub fn scan<'py>(py: Python<'py>, report: &ScanReport, files: &FilesReport) -> D
     all.set_item("datagrams", report.datagrams)?;
     let pauses: Vec<(i64, i64)> = report.pauses.iter().map(|p| (p.from.0, p.to.0)).collect();
     all.set_item("pauses_ns", pauses)?;
+    let unused = report.unused_units();
+    let unused: Vec<(&str, String)> = unused
+        .map(|file| (file.name.as_str(), file.first_line()))
+        .collect();
+    all.set_item("unused_files", unused)?;
     let fragments = PyDict::new(py);
     fragments.set_item("fragments", files.fragments.fragments)?;
     fragments.set_item("datagrams", files.fragments.datagrams)?;
@@ -66,7 +71,8 @@ fn stream<'py>(py: Python<'py>, info: &StreamInfo) -> Dict<'py> {
     dict.set_item("beams", beams)?;
     dict.set_item("named", info.is_named)?;
     dict.set_item("return_mode", info.return_mode)?;
-    dict.set_item("rpm", info.model.has_rotor().then_some(info.rpm))?;
+    let is_turning = info.model.has_rotor() && info.rpm > 0.0;
+    dict.set_item("rpm", is_turning.then_some(info.rpm))?;
     dict.set_item("packets", info.counts.packets)?;
     dict.set_item("lost", info.counts.lost)?;
     dict.set_item("duplicated", info.counts.duplicated)?;
@@ -128,6 +134,7 @@ fn other<'py>(py: Python<'py>, stream: &OtherStream) -> Dict<'py> {
     dict.set_item("port", stream.key.port)?;
     dict.set_item("packets", stream.packets)?;
     dict.set_item("positions", stream.positions)?;
+    dict.set_item("companions", stream.companions)?;
     dict.set_item("payload_bytes", stream.payload_len)?;
     dict.set_item("rate_hz", stream.rate_hz)?;
     let closest = stream.closest.as_ref();

@@ -125,6 +125,7 @@ impl SweepIterator {
             cut_azimuth_rad: cut_rad,
             start: start_ns.map(Timestamp),
             stop: stop_ns.map(Timestamp),
+            ..SweepOptions::default()
         };
         Ok(Self {
             feed: Feed::open(py, &scan.paths)?,

@@ -9,9 +9,9 @@ use std::f64::consts::{PI, TAU};
 use std::sync::LazyLock;
 
 use super::dat::{self, Cursor};
-use super::layout::{HEADER_LEN, Header, Layout, Tail, View, flag};
+use super::layout::{Frame, Header, Layout, Tail, View, flag};
 use super::rotating::{Family, Firing, Ray, Rotating, firings};
-use super::unit::{OBTAIN, Unit};
+use super::unit::{FireTimes, Unit};
 use crate::error::UnitError;
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{Decoded, Decoder, Place, ReturnMode};
@@ -19,11 +19,6 @@ use crate::packet::{Decoded, Decoder, Place, ReturnMode};
 const CHANNELS: usize = 128;
 const BLOCKS: usize = 2;
 const ECHO_LEN: usize = 4;
-const CRC_LEN: usize = 4;
-const SAFETY_LEN: usize = 17;
-const SIGNATURE_LEN: usize = 32;
-const TAIL_LEN: usize = 32;
-const SEQUENCE_LEN: usize = 4;
 const FIRING_NS: i64 = 41_666;
 /// Mirrors of the unit, and as many sweeps a turn of the encoder.
 const MIRRORS: f64 = 3.0;
@@ -37,16 +32,21 @@ const DEGREE: f64 = 25_600.0;
 const ADJUST_DEGREE: f64 = 100.0;
 const RAD_PER_FINE: f64 = PI / 18_000.0 / 256.0;
 
-const TAIL: Tail = Tail {
-    azimuth_state: None,
-    operation: None,
-    return_mode: 24,
-    speed: 18,
-    speed_rpm: 1.0,
-    date: Some(26),
-    micros: 20,
-    sequence: 32,
-    sequence_len: 4,
+const FRAME: Frame = Frame {
+    block_head: 3,
+    crc_len: 4,
+    tail_len: 32,
+    fields: Tail {
+        azimuth_state: None,
+        operation: None,
+        return_mode: 24,
+        speed: 18,
+        speed_rpm: 1.0,
+        date: Some(26),
+        micros: 20,
+        sequence: 32,
+        sequence_len: 4,
+    },
 };
 
 static NOMINAL: LazyLock<Unit> =
@@ -58,27 +58,6 @@ pub static AT128: Rotating<At128> = Rotating(At128);
 /// The model.
 #[derive(Debug, Clone, Copy)]
 pub struct At128;
-
-fn layout(header: &Header) -> Layout {
-    let option = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
-    let block_len = 3 + ECHO_LEN * CHANNELS;
-    let tail = HEADER_LEN + BLOCKS * block_len + CRC_LEN + option(flag::SAFETY, SAFETY_LEN);
-    let end = tail + TAIL_LEN + option(flag::SEQUENCE, SEQUENCE_LEN) + CRC_LEN;
-    Layout {
-        blocks: BLOCKS,
-        channels: CHANNELS,
-        body: HEADER_LEN,
-        block_len,
-        azimuth: 0,
-        echoes: 3,
-        echo_len: ECHO_LEN,
-        unit_m: header.unit_m(),
-        tail,
-        fields: TAIL,
-        has_sequence: header.has(flag::SEQUENCE),
-        len: end + option(flag::SIGNATURE, SIGNATURE_LEN),
-    }
-}
 
 impl Family for At128 {
     fn id(&self) -> &'static str {
@@ -93,7 +72,7 @@ impl Family for At128 {
         let header = Header::new(payload)?;
         let is_own = matches!(header.protocol, (4, 1 | 3))
             && (header.lasers, header.blocks) == (CHANNELS, BLOCKS);
-        let layout = layout(&header);
+        let layout = FRAME.layout(&header, ECHO_LEN);
         (is_own && payload.len() == layout.len).then_some(layout)
     }
 
@@ -135,13 +114,20 @@ impl Family for At128 {
 
     fn fit_binary(&self, files: &[UnitFile]) -> Option<Result<Fitted, UnitError>> {
         let file = files.iter().find(|file| self.takes_binary(file));
-        let fields = file.map_or_else(|| Ok(Fields::nominal()), Fields::read);
-        let used: Vec<&UnitFile> = file.into_iter().collect();
-        let nominal = Calibration::Nominal { obtain: OBTAIN };
-        Some(fields.map(|fields| Fitted {
-            decoder: Box::new(At128Decoder { fields }),
-            calibration: Calibration::of(&used, nominal),
-        }))
+        let fit = || {
+            let (unit, calibration) = NOMINAL.clone().with(files)?;
+            let (fields, calibration) = match file {
+                Some(file) => (Fields::read(file)?, Calibration::of(&[file], calibration)),
+                None => (Fields::of(&unit), calibration),
+            };
+            let times = unit.fire("fire").cloned().unwrap_or_default();
+            let decoder = Box::new(At128Decoder { fields, times });
+            Ok(Fitted {
+                decoder,
+                calibration,
+            })
+        };
+        Some(fit())
     }
 
     fn template(&self) -> Vec<u8> {
@@ -154,9 +140,7 @@ impl Family for At128 {
             returns: 1,
             flags: flag::SEQUENCE | flag::SAFETY,
         };
-        let mut bytes = vec![0; layout(&header).len];
-        header.write(&mut bytes);
-        bytes
+        FRAME.template(&header, ECHO_LEN)
     }
 }
 
@@ -173,12 +157,13 @@ struct Fields {
 }
 
 impl Fields {
-    fn nominal() -> Self {
+    /// The usual fields with the angles of a unit.
+    fn of(unit: &Unit) -> Self {
         let degrees = [23.075, 143.440, 263.133, 23.075].map(f64::to_radians);
         Self {
             fields_rad: degrees.windows(2).map(|pair| (pair[0], pair[1])).collect(),
-            azimuth_rad: NOMINAL.azimuth_rad.clone(),
-            elevation_rad: NOMINAL.elevation_rad.clone(),
+            azimuth_rad: unit.azimuth_rad.clone(),
+            elevation_rad: unit.elevation_rad.clone(),
             azimuth_adjust_rad: Vec::new(),
             elevation_adjust_rad: Vec::new(),
         }
@@ -225,18 +210,18 @@ impl Fields {
         self.fields_rad.iter().find_map(within)
     }
 
+    /// Where a channel points that fires at once.
     fn ray(&self, channel: usize, since_rad: f64, encoder_rad: f64) -> Option<Ray> {
         let adjust = |table: &[f64]| interpolate(table, channel, encoder_rad);
         let azimuth_rad =
             2.0 * since_rad - self.azimuth_rad.get(channel)? + adjust(&self.azimuth_adjust_rad);
         let elevation_rad = self.elevation_rad[channel] + adjust(&self.elevation_adjust_rad);
-        let delay_ns = NOMINAL.fire("fire")?[channel].unwrap_or(0.0);
         Some(Ray {
             laser: channel,
             azimuth_rad,
             azimuth: azimuth_rad.sin_cos(),
             elevation: elevation_rad.sin_cos(),
-            delay_ns: delay_ns.round() as i64,
+            delay_ns: 0,
         })
     }
 }
@@ -254,6 +239,7 @@ fn interpolate(table: &[f64], channel: usize, encoder_rad: f64) -> f64 {
 
 struct At128Decoder {
     fields: Fields,
+    times: FireTimes,
 }
 
 impl Decoder for At128Decoder {
@@ -282,7 +268,12 @@ impl Decoder for At128Decoder {
                 packet: place.packet,
             };
             firing.place(&view, out, |channel, _| {
-                self.fields.ray(channel, since_rad, encoder_rad)
+                let delay_ns = self.times.get(channel)?.unwrap_or(0.0);
+                let ray = self.fields.ray(channel, since_rad, encoder_rad)?;
+                Some(Ray {
+                    delay_ns: delay_ns.round() as i64,
+                    ..ray
+                })
             });
         }
     }
@@ -317,7 +308,7 @@ mod tests {
     #[test]
     fn the_file_says_what_the_nominal_table_says() {
         assert!(At128.takes_binary(&file()));
-        let (read, nominal) = (Fields::read(&file()).unwrap(), Fields::nominal());
+        let (read, nominal) = (Fields::read(&file()).unwrap(), Fields::of(&NOMINAL));
         for ((start, end), (other, last)) in read.fields_rad.iter().zip(&nominal.fields_rad) {
             assert!((start - other).abs() < 1e-4 && (end - last).abs() < 1e-4);
         }

@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use super::dat::{self, Cursor};
-use super::layout::{HEADER_LEN, Header, Layout, Tail, View, flag};
+use super::layout::{self, Header, Layout, Tail, View, flag};
 use super::rotating::{Family, Firing, Ray, Rotating, firings};
 use super::unit::{FireTimes, OBTAIN, Unit};
 use crate::error::UnitError;
@@ -18,11 +18,6 @@ use crate::packet::{Decoded, Decoder, Place, ReturnMode};
 /// Channels of the model.
 const CHANNELS: usize = 100;
 const ECHO_LEN: usize = 4;
-const CRC_LEN: usize = 4;
-const SAFETY_LEN: usize = 17;
-const SIGNATURE_LEN: usize = 32;
-const TAIL_LEN: usize = 32;
-const SEQUENCE_LEN: usize = 4;
 const FRAME_ID: usize = 10;
 const SPEED: usize = 18;
 /// Blocks are taken to follow each other like this: 0.1 degree of 120 at ten frames a second.
@@ -30,16 +25,27 @@ const FIRING_NS: i64 = 83_333;
 /// Radians of one unit of the azimuth.
 const RAD_PER_UNIT: f64 = PI / 180.0 / 256.0;
 
-const TAIL: Tail = Tail {
-    azimuth_state: None,
-    operation: Some(FRAME_ID),
-    return_mode: 24,
-    speed: SPEED,
-    speed_rpm: 1.0,
-    date: Some(26),
-    micros: 20,
-    sequence: 32,
-    sequence_len: 4,
+/// Packets without the fine part of the azimuth.
+const FRAME: layout::Frame = layout::Frame {
+    block_head: 2,
+    crc_len: 4,
+    tail_len: 32,
+    fields: Tail {
+        azimuth_state: None,
+        operation: Some(FRAME_ID),
+        return_mode: 24,
+        speed: SPEED,
+        speed_rpm: 1.0,
+        date: Some(26),
+        micros: 20,
+        sequence: 32,
+        sequence_len: 4,
+    },
+};
+/// Packets with it.
+const FINE: layout::Frame = layout::Frame {
+    block_head: 3,
+    ..FRAME
 };
 
 /// Elevation, azimuth of even frames, azimuth of odd frames and their firing times.
@@ -52,29 +58,6 @@ pub static ATX: Rotating<Atx> = Rotating(Atx);
 /// The model.
 #[derive(Debug, Clone, Copy)]
 pub struct Atx;
-
-fn layout(header: &Header, has_fine: bool) -> Layout {
-    let option = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
-    let echoes = 2 + usize::from(has_fine);
-    let block_len = echoes + ECHO_LEN * header.lasers;
-    let body_end = HEADER_LEN + header.blocks * block_len;
-    let tail = body_end + CRC_LEN + option(flag::SAFETY, SAFETY_LEN);
-    let end = tail + TAIL_LEN + option(flag::SEQUENCE, SEQUENCE_LEN) + CRC_LEN;
-    Layout {
-        blocks: header.blocks,
-        channels: header.lasers,
-        body: HEADER_LEN,
-        block_len,
-        azimuth: 0,
-        echoes,
-        echo_len: ECHO_LEN,
-        unit_m: header.unit_m(),
-        tail,
-        fields: TAIL,
-        has_sequence: header.has(flag::SEQUENCE),
-        len: end + option(flag::SIGNATURE, SIGNATURE_LEN),
-    }
-}
 
 fn is_odd(view: &View<'_>) -> bool {
     view.operation() & 1 == 1
@@ -91,7 +74,7 @@ impl Family for Atx {
 
     fn layout(&self, payload: &[u8]) -> Option<Layout> {
         let header = Header::new(payload).filter(|header| header.protocol == (4, 7))?;
-        let sizes = [false, true].map(|has_fine| layout(&header, has_fine));
+        let sizes = [FRAME, FINE].map(|frame| frame.layout(&header, ECHO_LEN));
         let is_own = header.blocks > 0 && header.lasers == CHANNELS;
         let found = sizes.into_iter().find(|layout| layout.len == payload.len());
         found.filter(|_| is_own)
@@ -132,19 +115,29 @@ impl Family for Atx {
         Some(view.operation().into())
     }
 
+    /// Even and odd frames have angles of their own, for which the text files have no room.
+    fn takes_angle_text(&self) -> bool {
+        false
+    }
+
     fn takes_binary(&self, file: &UnitFile) -> bool {
         matches!(dat::version(file), Some((4, 1..=3)))
     }
 
     fn fit_binary(&self, files: &[UnitFile]) -> Option<Result<Fitted, UnitError>> {
         let file = files.iter().find(|file| self.takes_binary(file));
-        let angles = file.map_or_else(|| Ok(Angles::nominal()), Angles::read);
-        let used: Vec<&UnitFile> = file.into_iter().collect();
-        let nominal = Calibration::Nominal { obtain: OBTAIN };
-        Some(angles.map(|angles| Fitted {
-            decoder: Box::new(AtxDecoder { angles }),
-            calibration: Calibration::of(&used, nominal),
-        }))
+        let fit = || {
+            let angles = file.map_or_else(|| Ok(Angles::nominal()), Angles::read)?;
+            let used: Vec<&UnitFile> = file.into_iter().collect();
+            let nominal = Calibration::Nominal { obtain: OBTAIN };
+            let (unit, _) = NOMINAL.clone().with(files)?;
+            let times = ["even", "odd"].map(|name| unit.fire(name).cloned().unwrap_or_default());
+            Ok(Fitted {
+                decoder: Box::new(AtxDecoder { angles, times }),
+                calibration: Calibration::of(&used, nominal),
+            })
+        };
+        Some(fit())
     }
 
     fn template(&self) -> Vec<u8> {
@@ -157,9 +150,7 @@ impl Family for Atx {
             returns: 1,
             flags: flag::SEQUENCE,
         };
-        let mut bytes = vec![0; layout(&header, false).len];
-        header.write(&mut bytes);
-        bytes
+        FRAME.template(&header, ECHO_LEN)
     }
 }
 
@@ -173,7 +164,7 @@ struct Angles {
 
 impl Angles {
     fn nominal() -> Self {
-        let odd = NOMINAL.fire("AzimuthOdd").cloned().unwrap_or_default();
+        let odd = NOMINAL.fire("azimuthodd").cloned().unwrap_or_default();
         let odd_deg = odd.iter().map(|value| value.unwrap_or(0.0) / 1000.0);
         Self {
             elevation: NOMINAL
@@ -221,8 +212,8 @@ impl Angles {
         })
     }
 
-    fn ray(&self, channel: usize, block_rad: f64, frame: &Frame<'_>) -> Option<Ray> {
-        let delay_ns = frame.times?.get(channel)?.unwrap_or(0.0);
+    fn ray(&self, channel: usize, block_rad: f64, frame: &Scan<'_>) -> Option<Ray> {
+        let delay_ns = frame.times.get(channel)?.unwrap_or(0.0);
         let azimuth_rad = block_rad
             + self.azimuth_rad[usize::from(frame.is_odd)].get(channel)?
             + delay_ns * frame.shift_rad_per_ns;
@@ -237,21 +228,21 @@ impl Angles {
 }
 
 /// What the frames differ in.
-struct Frame<'a> {
+struct Scan<'a> {
     is_odd: bool,
-    times: Option<&'a FireTimes>,
+    times: &'a FireTimes,
     /// Turn of the mirror while a channel waits.
     shift_rad_per_ns: f64,
 }
 
-impl Frame<'_> {
-    fn of(view: &View<'_>) -> Self {
+impl<'a> Scan<'a> {
+    fn of(view: &View<'_>, times: &'a [FireTimes; 2]) -> Self {
         let is_odd = is_odd(view);
         // Degrees are nanoseconds x speed x 1e-9 / 8, forth in even frames and back in odd ones.
         let shift_rad_per_ns = (view.rpm().abs() * 1e-9 / 8.0).to_radians();
         Self {
             is_odd,
-            times: NOMINAL.fire(if is_odd { "odd" } else { "even" }),
+            times: &times[usize::from(is_odd)],
             shift_rad_per_ns: if is_odd {
                 -shift_rad_per_ns
             } else {
@@ -263,6 +254,8 @@ impl Frame<'_> {
 
 struct AtxDecoder {
     angles: Angles,
+    /// Of even and of odd frames.
+    times: [FireTimes; 2],
 }
 
 impl Decoder for AtxDecoder {
@@ -273,7 +266,7 @@ impl Decoder for AtxDecoder {
         let Some(view) = view else {
             return out.drops.add("packet_size", 1);
         };
-        let frame = Frame::of(&view);
+        let frame = Scan::of(&view, &self.times);
         let left_over = view.layout().blocks % view.return_mode().returns();
         out.drops.add("block_invalid", left_over as u64);
         for first in firings(&view) {
@@ -319,5 +312,18 @@ mod tests {
         let mut bytes = vec![0xEE, 0xFF, 4, 3];
         bytes.extend([0; 100]);
         assert!(Angles::read(&UnitFile::new("atx.dat", bytes)).is_err());
+    }
+
+    #[test]
+    fn firing_times_of_a_file_are_taken_in_nanoseconds() {
+        let rows: String = (1..=CHANNELS)
+            .map(|n| format!("{n},{n},{}\n", 2 * n))
+            .collect();
+        let text = format!("Channel,Even_fire time(ns),Odd_fire time(ns)\n{rows}");
+        let file = UnitFile::new("times", text);
+        assert!(crate::packet::Model::takes(&ATX, &file));
+        let (unit, _) = NOMINAL.clone().with(&[file]).unwrap();
+        assert_eq!(unit.fire("odd").unwrap()[2], Some(6.0));
+        assert_eq!(unit.fire("azimuthodd"), NOMINAL.fire("azimuthodd"));
     }
 }

@@ -129,6 +129,61 @@ pub struct Tail {
     pub sequence_len: usize,
 }
 
+/// Bytes of the optional parts of modern packets.
+mod option {
+    pub const SAFETY_LEN: usize = 17;
+    pub const SEQUENCE_LEN: usize = 4;
+    pub const INERTIAL_LEN: usize = 22;
+    pub const SIGNATURE_LEN: usize = 32;
+}
+
+/// What stands around the echoes of a modern packet; the header's flags tell which optional parts are there.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// Bytes of a block before its echoes: the azimuth, and its fine part where there is one.
+    pub block_head: usize,
+    /// Bytes of each of the two checksums, behind the blocks and behind the tail.
+    pub crc_len: usize,
+    /// Bytes of the tail without optional parts.
+    pub tail_len: usize,
+    /// What the tail has.
+    pub fields: Tail,
+}
+
+impl Frame {
+    /// The layout of a packet with this header and so many bytes an echo.
+    pub fn layout(&self, header: &Header, echo_len: usize) -> Layout {
+        let part = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
+        let block_len = self.block_head + echo_len * header.lasers;
+        let body_end = HEADER_LEN + header.blocks * block_len + self.crc_len;
+        let tail = body_end + part(flag::SAFETY, option::SAFETY_LEN);
+        let behind = part(flag::SEQUENCE, option::SEQUENCE_LEN)
+            + part(flag::INERTIAL, option::INERTIAL_LEN)
+            + part(flag::SIGNATURE, option::SIGNATURE_LEN);
+        Layout {
+            blocks: header.blocks,
+            channels: header.lasers,
+            body: HEADER_LEN,
+            block_len,
+            azimuth: 0,
+            echoes: self.block_head,
+            echo_len,
+            unit_m: header.unit_m(),
+            tail,
+            fields: self.fields,
+            has_sequence: header.has(flag::SEQUENCE),
+            len: tail + self.tail_len + self.crc_len + behind,
+        }
+    }
+
+    /// Bytes of an empty packet with its header.
+    pub fn template(&self, header: &Header, echo_len: usize) -> Vec<u8> {
+        let mut bytes = vec![0; self.layout(header, echo_len).len];
+        header.write(&mut bytes);
+        bytes
+    }
+}
+
 /// A place behind the end of every packet: what stands there is read as 0 and not written.
 pub const NOWHERE: usize = 1 << 16;
 

@@ -13,8 +13,10 @@ use crate::time::NANOS_PER_SECOND;
 
 /// Time from one firing to the next.
 const FIRING_NS: i64 = 55_560;
-/// Metres of one unit of range.
-const RANGE_UNIT_M: f64 = 0.004;
+/// Unit of ranges, mm, where no header tells it.
+const RANGE_UNIT_MM: u8 = 4;
+/// Byte of a header that tells it.
+const UNIT_MM: usize = 5;
 /// Bytes of the tail with a sequence number, and without one.
 const TAIL_LENS: [usize; 2] = [26, 22];
 /// Bytes of the tail of old units, which ends before the date.
@@ -43,6 +45,7 @@ pub static PANDAR40P: Rotating<Pandar> = Rotating(Pandar {
     title: "Hesai Pandar40P",
     channels: 40,
     blocks: 10,
+    most_blocks: 10,
     header_len: 0,
     block_head: [0xFF, 0xEE],
     last_block_ns: -28_580,
@@ -64,6 +67,7 @@ pub static PANDAR64: Rotating<Pandar> = Rotating(Pandar {
     title: "Hesai Pandar64",
     channels: 64,
     blocks: 6,
+    most_blocks: 7,
     header_len: 8,
     block_head: [0, 0],
     last_block_ns: -42_580,
@@ -78,7 +82,9 @@ pub struct Pandar {
     title: &'static str,
     channels: usize,
     blocks: usize,
-    /// Bytes before the first block: none, or `EE FF`, lasers, blocks and four more.
+    /// More blocks, which some units send.
+    most_blocks: usize,
+    /// Bytes before the first block: none, or `EE FF`, lasers, blocks, return mode, unit of ranges and two more.
     header_len: usize,
     /// First bytes of a block before its azimuth; zeros: none.
     block_head: [u8; 2],
@@ -101,17 +107,53 @@ impl Pandar {
         self.azimuth() + 2 + 3 * self.channels
     }
 
-    fn tail(&self) -> usize {
-        self.header_len + self.blocks * self.block_len()
+    fn tail(&self, blocks: usize) -> usize {
+        self.header_len + blocks * self.block_len()
     }
 
-    fn is_own(&self, payload: &[u8]) -> bool {
+    fn is_own(&self, payload: &[u8], blocks: usize) -> bool {
         if self.has_block_head() {
-            let mut blocks = payload.chunks_exact(self.block_len()).take(self.blocks);
+            let mut blocks = payload.chunks_exact(self.block_len()).take(blocks);
             blocks.all(|block| block.starts_with(&self.block_head))
         } else {
-            payload.starts_with(&[0xEE, 0xFF, self.channels as u8, self.blocks as u8])
+            payload.starts_with(&[0xEE, 0xFF, self.channels as u8, blocks as u8])
         }
+    }
+
+    fn unit_m(&self, payload: &[u8]) -> f64 {
+        let told = payload.get(UNIT_MM).filter(|_| !self.has_block_head());
+        let told = told.filter(|unit_mm| (1..=10).contains(*unit_mm));
+        f64::from(*told.unwrap_or(&RANGE_UNIT_MM)) * 1e-3
+    }
+
+    fn layout_of(&self, payload: &[u8], blocks: usize) -> Option<Layout> {
+        let tail_len = payload.len().checked_sub(self.tail(blocks))?;
+        let is_len = if self.has_date {
+            TAIL_LENS.contains(&tail_len)
+        } else {
+            tail_len == SHORT_TAIL_LEN
+        };
+        (is_len && self.is_own(payload, blocks)).then(|| Layout {
+            blocks,
+            channels: self.channels,
+            body: self.header_len,
+            block_len: self.block_len(),
+            azimuth: self.azimuth(),
+            echoes: self.azimuth() + 2,
+            echo_len: 3,
+            unit_m: self.unit_m(payload),
+            tail: self.tail(blocks),
+            fields: Tail {
+                date: TAIL.date.filter(|_| self.has_date),
+                ..TAIL
+            },
+            has_sequence: tail_len == TAIL_LENS[0],
+            len: payload.len(),
+        })
+    }
+
+    fn firings_ns(&self, blocks: usize, mode: ReturnMode) -> i64 {
+        (blocks / mode.returns()) as i64 * FIRING_NS
     }
 }
 
@@ -125,29 +167,8 @@ impl Family for Pandar {
     }
 
     fn layout(&self, payload: &[u8]) -> Option<Layout> {
-        let tail_len = payload.len().checked_sub(self.tail())?;
-        let is_len = if self.has_date {
-            TAIL_LENS.contains(&tail_len)
-        } else {
-            tail_len == SHORT_TAIL_LEN
-        };
-        (is_len && self.is_own(payload)).then(|| Layout {
-            blocks: self.blocks,
-            channels: self.channels,
-            body: self.header_len,
-            block_len: self.block_len(),
-            azimuth: self.azimuth(),
-            echoes: self.azimuth() + 2,
-            echo_len: 3,
-            unit_m: RANGE_UNIT_M,
-            tail: self.tail(),
-            fields: Tail {
-                date: TAIL.date.filter(|_| self.has_date),
-                ..TAIL
-            },
-            has_sequence: tail_len == TAIL_LENS[0],
-            len: payload.len(),
-        })
+        let mut counts = self.blocks..=self.most_blocks;
+        counts.find_map(|blocks| self.layout_of(payload, blocks))
     }
 
     fn nominal(&self) -> &'static Unit {
@@ -155,12 +176,17 @@ impl Family for Pandar {
     }
 
     fn block_ns(&self, view: &View<'_>, block: usize) -> i64 {
-        let behind = (self.blocks - 1 - block.min(self.blocks - 1)) / view.return_mode().returns();
+        let last = view.layout().blocks - 1;
+        let behind = (last - block.min(last)) / view.return_mode().returns();
         self.last_block_ns - FIRING_NS * behind as i64
     }
 
     fn period_ns(&self, mode: ReturnMode) -> i64 {
-        (self.blocks / mode.returns()) as i64 * FIRING_NS
+        self.firings_ns(self.blocks, mode)
+    }
+
+    fn duration_ns(&self, view: &View<'_>) -> i64 {
+        self.firings_ns(view.layout().blocks, view.return_mode())
     }
 
     fn counting(&self) -> Counting {
@@ -176,13 +202,38 @@ impl Family for Pandar {
         } else {
             SHORT_TAIL_LEN
         };
-        let mut bytes = vec![0; self.tail() + tail_len];
+        let mut bytes = vec![0; self.tail(self.blocks) + tail_len];
         if self.has_block_head() {
             let blocks = bytes.chunks_exact_mut(self.block_len()).take(self.blocks);
             blocks.for_each(|block| block[..2].copy_from_slice(&self.block_head));
         } else {
             bytes[..4].copy_from_slice(&[0xEE, 0xFF, self.channels as u8, self.blocks as u8]);
+            bytes[UNIT_MM] = RANGE_UNIT_MM;
         }
         bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_units_of_seven_blocks_are_read_in_the_unit_that_their_header_tells() {
+        let mut bytes = vec![0; 1388];
+        bytes[..6].copy_from_slice(&[0xEE, 0xFF, 64, 7, 0, 2]);
+        let layout = PANDAR64.0.layout(&bytes).unwrap();
+        assert_eq!(
+            (layout.blocks, layout.tail, layout.has_sequence),
+            (7, 1366, false)
+        );
+        assert!((layout.unit_m - 0.002).abs() < 1e-12);
+        bytes.resize(1392, 0);
+        let view = View::new(&bytes, PANDAR64.0.layout(&bytes).unwrap()).unwrap();
+        assert!(view.sequence().is_some());
+        assert_eq!(PANDAR64.0.duration_ns(&view), 7 * FIRING_NS);
+        assert_eq!(PANDAR64.0.block_ns(&view, 6), -42_580);
+        bytes[3] = 6;
+        assert!(PANDAR64.0.layout(&bytes).is_none());
     }
 }

@@ -7,34 +7,33 @@
 
 use std::sync::LazyLock;
 
-use super::layout::{HEADER_LEN, Header, Layout, Tail, View, flag};
+use super::layout::{Frame, Header, Layout, Tail, View, flag};
 use super::rotating::{Family, Rotating};
 use super::unit::Unit;
 use crate::packet::ReturnMode;
 
 const BLOCKS: usize = 2;
-const CRC_LEN: usize = 4;
-const SAFETY_LEN: usize = 17;
-const INERTIAL_LEN: usize = 22;
-const SIGNATURE_LEN: usize = 32;
-const TAIL_LEN: usize = 26;
-const SEQUENCE_LEN: usize = 4;
 /// Half of the time from one block to the next at the fine resolution.
 const STEP_NS: i64 = 27_778;
 /// Modes of operation: fine resolution, standard, saving energy.
 const FINE: u8 = 0;
 const SAVING: u8 = 3;
 
-const TAIL: Tail = Tail {
-    azimuth_state: Some(9),
-    operation: Some(11),
-    return_mode: 12,
-    speed: 13,
-    speed_rpm: 1.0,
-    date: Some(15),
-    micros: 21,
-    sequence: 26,
-    sequence_len: 4,
+const FRAME: Frame = Frame {
+    block_head: 2,
+    crc_len: 4,
+    tail_len: 26,
+    fields: Tail {
+        azimuth_state: Some(9),
+        operation: Some(11),
+        return_mode: 12,
+        speed: 13,
+        speed_rpm: 1.0,
+        date: Some(15),
+        micros: 21,
+        sequence: 26,
+        sequence_len: 4,
+    },
 };
 
 static UNIT_128: LazyLock<Unit> =
@@ -110,29 +109,9 @@ pub struct Pandar128 {
 
 impl Pandar128 {
     fn layout_of(&self, header: &Header) -> Layout {
-        let option = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
-        let echo_len = header.echo_len();
-        let block_len = 2 + echo_len * self.channels;
-        let body_end = HEADER_LEN + BLOCKS * block_len;
-        let tail = body_end + CRC_LEN + option(flag::SAFETY, SAFETY_LEN);
-        let options = option(flag::SEQUENCE, SEQUENCE_LEN) + option(flag::INERTIAL, INERTIAL_LEN);
-        Layout {
-            blocks: BLOCKS,
-            channels: self.channels,
-            body: HEADER_LEN,
-            block_len,
-            azimuth: 0,
-            echoes: 2,
-            echo_len,
-            unit_m: header.unit_m(),
-            tail,
-            fields: Tail {
-                speed_rpm: self.speed_rpm,
-                ..TAIL
-            },
-            has_sequence: header.has(flag::SEQUENCE),
-            len: tail + TAIL_LEN + options + CRC_LEN + option(flag::SIGNATURE, SIGNATURE_LEN),
-        }
+        let mut layout = FRAME.layout(header, header.echo_len());
+        layout.fields.speed_rpm = self.speed_rpm;
+        layout
     }
 
     /// Time from one firing to the next, in the mode of operation.
@@ -221,8 +200,6 @@ impl Family for Pandar128 {
             returns: 1,
             flags: flag::SEQUENCE | flag::INERTIAL,
         };
-        let mut bytes = vec![0; self.layout_of(&header).len];
-        header.write(&mut bytes);
-        bytes
+        FRAME.template(&header, header.echo_len())
     }
 }

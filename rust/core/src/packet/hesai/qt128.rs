@@ -6,7 +6,7 @@
 
 use std::sync::LazyLock;
 
-use super::layout::{HEADER_LEN, Header, Layout, Tail, View, flag};
+use super::layout::{Frame, Header, Layout, Tail, View, flag};
 use super::rotating::{Family, Rotating};
 use super::unit::Unit;
 use crate::packet::ReturnMode;
@@ -17,24 +17,22 @@ const BLOCKS: usize = 2;
 /// Time of the first firing after the packet's, and from one to the next.
 const FIRST_NS: i64 = 9_000;
 const FIRING_NS: i64 = 111_110;
-/// Checksums of body and tail.
-const CRC_LEN: usize = 4;
-const SAFETY_LEN: usize = 17;
-const SIGNATURE_LEN: usize = 32;
-/// Tail without and with the sequence number.
-const TAIL_LEN: usize = 26;
-const SEQUENCE_LEN: usize = 4;
 
-const TAIL: Tail = Tail {
-    azimuth_state: None,
-    operation: Some(5),
-    return_mode: 12,
-    speed: 13,
-    speed_rpm: 1.0,
-    date: Some(15),
-    micros: 21,
-    sequence: 26,
-    sequence_len: 4,
+const FRAME: Frame = Frame {
+    block_head: 2,
+    crc_len: 4,
+    tail_len: 26,
+    fields: Tail {
+        azimuth_state: None,
+        operation: Some(5),
+        return_mode: 12,
+        speed: 13,
+        speed_rpm: 1.0,
+        date: Some(15),
+        micros: 21,
+        sequence: 26,
+        sequence_len: 4,
+    },
 };
 
 static UNIT: LazyLock<Unit> =
@@ -58,27 +56,9 @@ pub const fn writer(channels: usize) -> Rotating<Qt128> {
 /// The flag that other models have for light: channels are a choice, as the maker's kit has it.
 const CHOICE: u8 = flag::LIGHT;
 
-/// Layout of a packet with this header; the flag of a choice may bring a byte of light or none.
-fn layout(header: &Header, has_light: bool) -> Layout {
-    let option = |flag: u8, len: usize| if header.has(flag) { len } else { 0 };
-    let echo_len = header.echo_len() - usize::from(header.has(CHOICE) && !has_light);
-    let block_len = 2 + echo_len * header.lasers;
-    let tail = HEADER_LEN + BLOCKS * block_len + CRC_LEN + option(flag::SAFETY, SAFETY_LEN);
-    let end = tail + TAIL_LEN + option(flag::SEQUENCE, SEQUENCE_LEN) + CRC_LEN;
-    Layout {
-        blocks: BLOCKS,
-        channels: header.lasers,
-        body: HEADER_LEN,
-        block_len,
-        azimuth: 0,
-        echoes: 2,
-        echo_len,
-        unit_m: header.unit_m(),
-        tail,
-        fields: TAIL,
-        has_sequence: header.has(flag::SEQUENCE),
-        len: end + option(flag::SIGNATURE, SIGNATURE_LEN),
-    }
+/// Bytes of an echo; the flag of a choice may bring a byte of light or none.
+fn echo_len(header: &Header, has_light: bool) -> usize {
+    header.echo_len() - usize::from(header.has(CHOICE) && !has_light)
 }
 
 impl Family for Qt128 {
@@ -95,7 +75,8 @@ impl Family for Qt128 {
         let is_own = header.protocol == (3, 2)
             && header.blocks == BLOCKS
             && (1..=LASERS).contains(&header.lasers);
-        let sizes = [false, true].map(|has_light| layout(&header, has_light));
+        let sizes =
+            [false, true].map(|has_light| FRAME.layout(&header, echo_len(&header, has_light)));
         let found = sizes.into_iter().find(|layout| layout.len == payload.len());
         found.filter(|_| is_own)
     }
@@ -151,8 +132,6 @@ impl Family for Qt128 {
             returns: 1,
             flags: flag::SEQUENCE | flag::SAFETY | flag::SIGNATURE | flag::CONFIDENCE | choice,
         };
-        let mut bytes = vec![0; layout(&header, false).len];
-        header.write(&mut bytes);
-        bytes
+        FRAME.template(&header, echo_len(&header, false))
     }
 }

@@ -106,6 +106,11 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
         None
     }
 
+    /// Whether the maker's text files of angles are for it.
+    fn takes_angle_text(&self) -> bool {
+        true
+    }
+
     /// Whether a file describes a unit, where it is not the maker's text files that do.
     fn takes_binary(&self, _file: &UnitFile) -> bool {
         false
@@ -213,9 +218,7 @@ impl<F: Family> Model for Rotating<F> {
 
     fn takes(&self, file: &UnitFile) -> bool {
         match unit::kind(file) {
-            Some(Kind::Angles) => {
-                unit::angle_channels(file) == Some(self.0.nominal().elevation_rad.len())
-            }
+            Some(Kind::Angles) => self.0.takes_angle_text() && unit::is_of(file, self.0.nominal()),
             Some(Kind::FireTimes) => self
                 .0
                 .nominal()
@@ -289,6 +292,7 @@ struct RotatingDecoder<F> {
     delays_ns: Vec<Vec<f64>>,
     aims: Vec<Aims>,
     channels: Option<Channels>,
+    near_m: f64,
 }
 
 impl<F: Family> RotatingDecoder<F> {
@@ -315,6 +319,7 @@ impl<F: Family> RotatingDecoder<F> {
             aims: vec![never; delays_ns.len()],
             delays_ns,
             channels,
+            near_m: unit.near_m.unwrap_or(family.near_m()),
         }
     }
 
@@ -363,7 +368,7 @@ impl<F: Family> RotatingDecoder<F> {
                 .drops
                 .add("channels_unknown", view.return_mode().returns() as u64);
         };
-        let (head, near_m) = (block_rad.sin_cos(), self.family.near_m());
+        let (head, near_m) = (block_rad.sin_cos(), self.near_m);
         let firing = Firing {
             first,
             encoder_rad: self.family.encoder_rad(view, first).unwrap_or(block_rad),

@@ -1,10 +1,9 @@
 //! Angles and firing times of one unit: the maker's text files, and the tables that are built in.
-//!
-//! A text file has a header line that names its columns. Channels count from 1; rows may stand in any
-//! order; a byte order mark, empty cells, `EEFF` lines before the header and a digest at the end do not
-//! matter.
 
+use super::firing;
+use super::text::Table;
 use crate::error::UnitError;
+use crate::packet::beams::is_near;
 use crate::packet::unit::{Calibration, UnitFile};
 
 /// Times of one way to fire, ns, by channel; `None` where a channel does not fire.
@@ -19,6 +18,8 @@ pub struct Unit {
     pub azimuth_rad: Vec<f64>,
     /// Firing times by name of the column.
     pub fire_times: Vec<(String, FireTimes)>,
+    /// Targets nearer than this have the firing times for near ones, where a file tells it.
+    pub near_m: Option<f64>,
 }
 
 /// How to get the files of a unit.
@@ -30,16 +31,21 @@ impl Unit {
     pub fn built_in(name: &'static str, text: &str) -> Self {
         let file = UnitFile::new(name, text);
         let table = Table::new(&file).expect("the built-in tables have a header");
-        let angles = table.angles(&file).expect("the built-in tables are sound");
+        let angles = angles(&table, &file).expect("the built-in tables are sound");
         let names = table.names.iter().skip(3).cloned();
         let times = names.enumerate().map(|(place, name)| {
-            let column = table.column(&file, 0, place + 3, table.rows.len());
-            (name, column.expect("the built-in tables are sound"))
+            let column = table.column(&file, 0, place + 3, table.count());
+            let column = column.expect("the built-in tables are sound");
+            let nanos = column
+                .into_iter()
+                .map(|micros| micros.map(|us| us * 1000.0));
+            (name, nanos.collect())
         });
         Self {
             elevation_rad: angles.0,
             azimuth_rad: angles.1,
             fire_times: times.collect(),
+            near_m: None,
         }
     }
 
@@ -58,9 +64,9 @@ impl Unit {
         let find = |wanted: Kind| files.iter().find(|file| kind(file) == Some(wanted));
         let nominal = Calibration::Nominal { obtain: OBTAIN };
         if let Some(file) = find(Kind::Angles) {
-            let angles = Table::new(file)
-                .ok_or_else(|| file.refuse(None, "a header line", "none"))?
-                .angles(file)?;
+            let table = Table::new(file);
+            let table = table.ok_or_else(|| file.refuse(None, "a header line", "none"))?;
+            let angles = angles(&table, file)?;
             let channels = self.elevation_rad.len();
             if angles.0.len() != channels {
                 let found = angles.0.len().to_string();
@@ -82,20 +88,32 @@ impl Unit {
         Ok((self, calibration))
     }
 
-    /// Replaces the firing times that the file has: one column of channels, or one a loop.
+    /// Replaces the firing times by those of a file.
     fn read_fire_times(&mut self, file: &UnitFile) -> Result<(), UnitError> {
-        let Some(table) = Table::new(file) else {
-            return Err(file.refuse(None, "a header line", "none"));
-        };
         let channels = self.elevation_rad.len();
-        for (pair, (_, times)) in self.fire_times.iter_mut().enumerate() {
-            let (key, value) = (2 * pair, 2 * pair + 1);
-            if value < table.names.len() {
-                *times = table.column(file, key, value, channels)?;
-            }
+        let ways = self.fire_times.iter_mut();
+        // Beside them an ATX has azimuths of odd frames.
+        let mut ways: Vec<_> = ways
+            .filter(|(name, _)| !name.starts_with("azimuth"))
+            .collect();
+        let firing = firing::read(file, channels, ways.len())?;
+        for ((_, times), told) in ways.iter_mut().zip(firing.times) {
+            *times = told;
         }
+        self.near_m = firing.near_m;
         Ok(())
     }
+}
+
+/// Elevations and azimuths, radians.
+fn angles(table: &Table, file: &UnitFile) -> Result<(Vec<f64>, Vec<f64>), UnitError> {
+    let count = table.count();
+    let whole = |column: usize| {
+        let values = table.column(file, 0, column, count)?;
+        let all: Option<Vec<f64>> = values.iter().map(|deg| deg.map(f64::to_radians)).collect();
+        all.ok_or_else(|| file.refuse(None, format!("channels 1 to {count}, each once"), "a gap"))
+    };
+    Ok((whole(1)?, whole(2)?))
 }
 
 /// What a text file is.
@@ -116,7 +134,7 @@ pub fn kind(file: &UnitFile) -> Option<Kind> {
     let has = |word: &str| head.iter().any(|line| line.contains(word));
     if has("elevation") && has("azimuth") {
         Some(Kind::Angles)
-    } else if has("fire time") || has("firetime") {
+    } else if firing::is_head(&head) {
         Some(Kind::FireTimes)
     } else if has("loop1") && has("lasernum") {
         Some(Kind::Channels)
@@ -125,103 +143,15 @@ pub fn kind(file: &UnitFile) -> Option<Kind> {
     }
 }
 
-/// Number of channels that an angle file has; `None` for another file.
-pub fn angle_channels(file: &UnitFile) -> Option<usize> {
-    if kind(file)? != Kind::Angles {
-        return None;
-    }
-    let table = Table::new(file)?;
-    let numbers = table
-        .rows
-        .iter()
-        .map(|(_, cells)| cells[0].parse::<usize>());
-    Some(numbers.filter(Result::is_ok).count())
-}
-
-/// Cells of a text file by line.
-struct Table {
-    names: Vec<String>,
-    rows: Vec<(usize, Vec<String>)>,
-}
-
-impl Table {
-    /// `None` where no line has names of columns.
-    fn new(file: &UnitFile) -> Option<Self> {
-        let text = file.text()?;
-        let cells = |line: &str| {
-            line.split(',')
-                .map(|cell| cell.trim().to_owned())
-                .collect::<Vec<_>>()
-        };
-        let mut lines = text
-            .lines()
-            .enumerate()
-            .map(|(n, line)| (n + 1, cells(line)));
-        let is_header = |cells: &[String]| {
-            let first = cells[0].to_ascii_lowercase();
-            ["channel", "laser id", "loop1"]
-                .iter()
-                .any(|name| first.starts_with(name))
-        };
-        let (_, names) = lines.find(|(_, cells)| is_header(cells))?;
-        let is_row = |cells: &[String]| cells.len() > 1 && cells[0].parse::<f64>().is_ok();
-        let rows = lines.filter(|(_, cells)| is_row(cells)).collect();
-        Some(Self { names, rows })
-    }
-
-    /// Elevations and azimuths, radians.
-    fn angles(&self, file: &UnitFile) -> Result<(Vec<f64>, Vec<f64>), UnitError> {
-        let count = self.rows.len();
-        let whole = |column: usize| {
-            let values = self.column(file, 0, column, count)?;
-            let angles = values
-                .iter()
-                .map(|value| value.map(|micros| (micros / 1000.0).to_radians()));
-            let all: Option<Vec<f64>> = angles.collect();
-            all.ok_or_else(|| {
-                file.refuse(None, format!("channels 1 to {count}, each once"), "a gap")
-            })
-        };
-        Ok((whole(1)?, whole(2)?))
-    }
-
-    /// Values of one column times 1000, by the 1-based numbers in another; 0 numbers nothing.
-    fn column(
-        &self,
-        file: &UnitFile,
-        key: usize,
-        value: usize,
-        channels: usize,
-    ) -> Result<FireTimes, UnitError> {
-        let mut values = vec![None; channels];
-        for (line, cells) in &self.rows {
-            let (Some(key), Some(cell)) = (cells.get(key), cells.get(value)) else {
-                return Err(file.refuse(
-                    Some(*line),
-                    format!("{} cells", value + 1),
-                    cells.len().to_string(),
-                ));
-            };
-            if key == "0" || cell == "-" || cell.is_empty() {
-                continue;
-            }
-            let number = cell.parse::<f64>().ok().filter(|number| number.is_finite());
-            let number =
-                number.ok_or_else(|| file.refuse(Some(*line), "a number", format!("{cell:?}")))?;
-            let place = key
-                .parse::<usize>()
-                .ok()
-                .and_then(|number| number.checked_sub(1));
-            match place.and_then(|place| values.get_mut(place)) {
-                Some(slot) => *slot = Some(number * 1000.0),
-                None => {
-                    let expected = format!("a channel from 1 to {channels}");
-                    return Err(file.refuse(Some(*line), expected, format!("{key:?}")));
-                }
-            }
-        }
-        Ok(values)
-    }
+/// Whether a file of angles is of a unit of the model with this table: as many channels, and elevations near
+/// the model's, for others have as many. What is broken is left for [`Unit::with`] to tell.
+pub fn is_of(file: &UnitFile, model: &Unit) -> bool {
+    let Some(table) = Table::new(file) else {
+        return false;
+    };
+    let is_near =
+        || angles(&table, file).map_or(true, |told| is_near(&told.0, &model.elevation_rad));
+    table.channels() == model.elevation_rad.len() && is_near()
 }
 
 #[cfg(test)]
@@ -257,16 +187,14 @@ mod tests {
     }
 
     #[test]
-    fn loops_have_channels_of_their_own() {
+    fn firing_times_of_another_shape_are_refused() {
         let table = "Channel,Elevation,Azimuth,loop1,loop2\n1,1,1,-,-\n2,2,2,-,-\n";
-        let file = UnitFile::new(
-            "t",
-            "EEFF,1,1,\nHorizontal,1,LoopNum,2\nLoop1,Firetime1,Loop2,Firetime2\n2,0.6,1,1.5\n0,0,0,0\n",
+        let file = UnitFile::new("t", "Channel,fire time(us)\n1,1.5\n2,1.6\n");
+        let error = Unit::built_in("q", table).with(&[file]).unwrap_err();
+        assert!(
+            error.to_string().contains("2 columns of firing times"),
+            "{error}"
         );
-        assert_eq!(kind(&file), Some(Kind::FireTimes));
-        let (unit, _) = Unit::built_in("q", table).with(&[file]).unwrap();
-        assert_eq!(unit.fire("loop1").unwrap(), &[None, Some(600.0)]);
-        assert_eq!(unit.fire("loop2").unwrap(), &[Some(1500.0), None]);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 
 use std::sync::LazyLock;
 
-use super::layout::{HEADER_LEN, Header, Layout, Tail, View, flag};
+use super::layout::{Frame, Header, Layout, Tail, View, flag};
 use super::rotating::{Family, Rotating};
 use super::unit::Unit;
 use crate::packet::ReturnMode;
@@ -30,8 +30,8 @@ const TAIL_QT: Tail = Tail {
     micros: 12,
     ..TAIL_XT
 };
-/// Bytes of both tails with the sequence number.
-const TAIL_LEN: usize = 28;
+/// Bytes of both tails without the sequence number, which old units do not send.
+const TAIL_LEN: usize = 24;
 
 static UNIT_XT16: LazyLock<Unit> =
     LazyLock::new(|| Unit::built_in("xt16", include_str!("tables/pandarxt16.csv")));
@@ -115,12 +115,13 @@ pub struct Xt {
 }
 
 impl Xt {
-    fn block_len(&self) -> usize {
-        2 + ECHO_LEN * self.channels
-    }
-
-    fn tail_start(&self) -> usize {
-        HEADER_LEN + self.blocks * self.block_len()
+    fn frame(&self) -> Frame {
+        Frame {
+            block_head: 2,
+            crc_len: 0,
+            tail_len: TAIL_LEN,
+            fields: *self.tail,
+        }
     }
 }
 
@@ -137,21 +138,13 @@ impl Family for Xt {
         let header = Header::new(payload)?;
         let is_own = header.protocol == self.protocol
             && (header.lasers, header.blocks) == (self.channels, self.blocks);
-        let len = self.tail_start() + TAIL_LEN;
-        (is_own && payload.len() == len).then(|| Layout {
-            blocks: self.blocks,
-            channels: self.channels,
-            body: HEADER_LEN,
-            block_len: self.block_len(),
-            azimuth: 0,
-            echoes: 2,
-            echo_len: ECHO_LEN,
-            unit_m: header.unit_m(),
-            tail: self.tail_start(),
-            fields: *self.tail,
-            has_sequence: true,
-            len,
-        })
+        // Of the flags these models have one; some set it not and send the number all the same.
+        let sized = [flag::SEQUENCE, header.flags & flag::SEQUENCE].map(|flags| {
+            let header = Header { flags, ..header };
+            self.frame().layout(&header, ECHO_LEN)
+        });
+        let found = sized.into_iter().find(|layout| layout.len == payload.len());
+        found.filter(|_| is_own)
     }
 
     fn nominal(&self) -> &'static Unit {
@@ -178,7 +171,6 @@ impl Family for Xt {
     }
 
     fn template(&self) -> Vec<u8> {
-        let mut bytes = vec![0; self.tail_start() + TAIL_LEN];
         let header = Header {
             protocol: self.protocol,
             version: 0,
@@ -188,7 +180,6 @@ impl Family for Xt {
             returns: 1,
             flags: flag::SEQUENCE,
         };
-        header.write(&mut bytes);
-        bytes
+        self.frame().template(&header, ECHO_LEN)
     }
 }

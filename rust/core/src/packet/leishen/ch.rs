@@ -82,11 +82,8 @@ impl Ch {
     }
 
     fn is_own(&self, view: &View<'_>) -> bool {
-        /// A CH64W sends what lies beyond.
-        const SHORT_CENTIDEG: std::ops::RangeInclusive<u16> = 2_500..=15_500;
-        const LEAST_ECHOES: usize = 2;
         let is_record = |record: &Record| {
-            let is_azimuth = record.azimuth <= 18_000
+            let is_azimuth = record.azimuth <= MOST_CENTIDEG
                 && (!self.is_short()
                     || !record.is_seen()
                     || SHORT_CENTIDEG.contains(&record.azimuth));
@@ -96,7 +93,8 @@ impl Ch {
         let is_time = below < NANOS_PER_SECOND as u32 && (!self.is_short() || view.second() < 60);
         is_time
             && view.records().all(|record| is_record(&record))
-            && view.records().filter(Record::is_seen).count() >= LEAST_ECHOES
+            && is_seen(view)
+            && (self.is_short() || view.records().any(|record| record.line > 0))
     }
 
     fn duration_ns(&self, mode: ReturnMode) -> f64 {
@@ -107,6 +105,31 @@ impl Ch {
     pub fn encode(&self, packet: &RawPacket) -> Vec<u8> {
         packet::encode(packet, self.mirror.len, self.is_micros)
     }
+}
+
+/// Azimuths that the models of short packets send; a CH64W sends what lies beyond.
+const SHORT_CENTIDEG: std::ops::RangeInclusive<u16> = 2_500..=15_500;
+/// Azimuths that any model sends.
+const MOST_CENTIDEG: u16 = 18_000;
+
+fn is_seen(view: &View<'_>) -> bool {
+    const LEAST_ECHOES: usize = 2;
+    view.records().filter(Record::is_seen).count() >= LEAST_ECHOES
+}
+
+/// Whether a payload is of a CH64W, which is not decoded: lines below 64, azimuths beyond those of its siblings.
+pub fn is_wide(payload: &[u8]) -> bool {
+    let is_record = |record: Record| record.line < 64 && record.azimuth <= MOST_CENTIDEG;
+    let is_beyond = |record: Record| record.is_seen() && !SHORT_CENTIDEG.contains(&record.azimuth);
+    View::new(payload, 1206).is_some_and(|view| {
+        is_seen(&view) && view.records().all(is_record) && view.records().any(is_beyond)
+    })
+}
+
+/// Whether a payload is of a CX1S3, which is not decoded: one line.
+pub fn is_one_line(payload: &[u8]) -> bool {
+    let is_record = |record: Record| record.line == 0 && record.azimuth <= MOST_CENTIDEG;
+    View::new(payload, 1212).is_some_and(|view| is_seen(&view) && view.records().all(is_record))
 }
 
 /// Azimuth of the first record, how far the records go on from it, and the way of the mirror back.

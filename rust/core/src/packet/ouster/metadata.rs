@@ -243,9 +243,10 @@ impl Source<'_> {
         let name = "lidar_origin_to_beam_origin_mm";
         let known = self.value("beam_intrinsics", name).and_then(Json::number);
         let product = self.text("sensor_info", "prod_line");
+        // As the maker's kit has it, which takes no account of the first OS-1-64 (12.163).
         let by_product = || match product.get(..5) {
             Some("OS-0-") => 27.67,
-            Some("OS-1-") if !product.ends_with("OS-1-64") => 15.806,
+            Some("OS-1-") => 15.806,
             Some("OS-2-") => 13.762,
             _ => 12.163,
         };
@@ -366,12 +367,12 @@ mod tests {
     }
 
     #[test]
-    fn old_files_with_an_error_instead_of_the_format_are_first_generation() {
+    fn old_files_with_an_error_instead_of_the_format_are_read() {
         let old = of(r#"{"lidar_mode": "2048x10", "lidar_data_format": "error: unknown", "prod_line": "OS-1-64"}"#).unwrap();
         assert_eq!((old.elevation_rad.len(), old.columns_per_turn), (64, 2048));
         assert_eq!(
             (old.layout.packet_len(), old.beam_origin_mm),
-            (12_608, (12.163, 0.0))
+            (12_608, (15.806, 0.0))
         );
     }
 

@@ -25,7 +25,7 @@ pub static ROWS: &[Row] = &[
     ),
     row(
         "pandar64",
-        "1194 or 1198 bytes, `EE FF 40 06`",
+        "1194 or 1198 bytes, `EE FF 40 06`; 1388 or 1392, `EE FF 40 07`",
         RETURNS,
         CSV,
         Proof::RealPackets("HesaiLidar_SDK_2.0, dual return, within 0.1 mm + 2e-6 of the range"),
@@ -93,14 +93,14 @@ pub static ROWS: &[Row] = &[
         "at128",
         "protocol 4.1 or 4.3",
         RETURNS,
-        "binary file of the maker; else nominal",
+        "binary file of the maker or angle CSV, firing times CSV; else nominal",
         Proof::RoundTrip,
     ),
     row(
         "atx",
         "protocol 4.7, 100 channels",
         RETURNS,
-        "binary file of the maker but for version 4.3; else nominal",
+        "binary file of the maker but for version 4.3, firing times CSV; else nominal",
         Proof::RoundTrip,
     ),
     row(

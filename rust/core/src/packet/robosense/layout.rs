@@ -7,7 +7,7 @@ use crate::packet::hesai::date;
 use crate::time::NANOS_PER_SECOND;
 
 /// Byte ranges of the header.
-pub(super) mod field {
+pub(in crate::packet) mod field {
     use std::ops::Range;
 
     pub const COUNTER: Range<usize> = 12..16; // u32

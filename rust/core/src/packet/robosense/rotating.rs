@@ -5,14 +5,13 @@
 
 mod turn;
 
-use std::f64::consts::TAU;
 use std::fmt::Debug;
 
 use super::difop::{self, Angles, Difop};
 use super::layout::{Layout, RawPacket, View, encode};
 use crate::cloud::Return;
 use crate::error::UnitError;
-use crate::packet::aim::wrapped;
+use crate::packet::aim::{wrapped, wrapped_far};
 use crate::packet::echoes::{RawEcho, judge};
 use crate::packet::split::{Following, Half, Split};
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
@@ -545,7 +544,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                     xyz_m: self.position(laser, range_m, azimuth_rad),
                     time: place.time + turn.start_ns(shot.firing) + shot.slot.delay_ns,
                     range_m: range_m as f32,
-                    azimuth_rad: wrapped((azimuth_rad + laser.azimuth_rad).rem_euclid(TAU)),
+                    azimuth_rad: wrapped_far(azimuth_rad + laser.azimuth_rad),
                     ring: laser.ring,
                     intensity: echo.intensity.into(),
                     return_index: index as u8,

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use crate::error::{InvalidValue, UnitError};
 use crate::packet::Decoder;
-use crate::packet::beams::{Beam, Beams};
+use crate::packet::beams::{Beam, Beams, is_near};
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 
 /// What a file says of one laser. What it leaves out is 0.
@@ -50,9 +50,22 @@ impl Laser {
 }
 
 /// Whether `file` describes a unit with so many lasers.
-pub fn takes(file: &UnitFile, lasers: usize) -> bool {
+pub fn has_lasers(file: &UnitFile, lasers: usize) -> bool {
     file.text()
         .is_some_and(|text| count(&text).is_some_and(|found| found == lasers))
+}
+
+/// Whether `file` describes a unit of the model with these beams: as many lasers, and elevations near the
+/// model's, for others have as many. What is broken is left for [`lasers`] to tell.
+pub fn takes(file: &UnitFile, nominal: &Beams) -> bool {
+    let nominal = nominal.channels();
+    let elevations = lasers(file)
+        .map(|lasers| -> Vec<f64> { lasers.iter().map(|laser| laser.elevation_rad).collect() });
+    let model = nominal
+        .iter()
+        .map(|beam| beam.elevation_rad)
+        .collect::<Vec<_>>();
+    has_lasers(file, nominal.len()) && elevations.map_or(true, |told| is_near(&told, &model))
 }
 
 /// A decoder for the unit of the file among `files`, or for `nominal` beams.
@@ -61,9 +74,7 @@ pub fn fit(
     nominal: &Beams,
     decoder: impl Fn(&Beams) -> Result<Box<dyn Decoder>, InvalidValue>,
 ) -> Result<Fitted, UnitError> {
-    let own = files
-        .iter()
-        .find(|file| takes(file, nominal.channels().len()));
+    let own = files.iter().find(|file| takes(file, nominal));
     let beams = match own {
         None => nominal.clone(),
         Some(file) => {
@@ -171,12 +182,20 @@ impl Item<'_> {
             distance_y_m: near("distance_y")?,
             vertical_offset_m: metres("vertical")?,
             horizontal_offset_m: metres("horizontal")?,
-            // Centimetres in both.
-            focal_distance_m: self.number(file, "focal_distance")? * 0.01,
+            focal_distance_m: self.focal_distance_m(file)?,
             focal_slope: self.number(file, "focal_slope")?,
             min_intensity: self.number(file, "min_intensity")?,
             max_intensity: self.number(file, "max_intensity")?,
         })
+    }
+
+    /// Metres in the YAML, but for files whose makers left the viewer's centimetres as they were.
+    fn focal_distance_m(&self, file: &UnitFile) -> Result<f64, UnitError> {
+        /// The lasers see no farther.
+        const MOST_M: f64 = 131.0;
+        let value = self.number(file, "focal_distance")?;
+        let is_metres = !self.is_xml && value <= MOST_M;
+        Ok(if is_metres { value } else { value * 0.01 })
     }
 
     fn number(&self, file: &UnitFile, name: &'static str) -> Result<f64, UnitError> {
@@ -286,7 +305,7 @@ mod tests {
     fn both_styles_of_the_list_are_read_by_number() {
         for text in [BLOCK, FLOW] {
             let file = UnitFile::new("unit.yaml", text);
-            assert!(takes(&file, 2) && !takes(&file, 16));
+            assert!(has_lasers(&file, 2) && !has_lasers(&file, 16));
             let lasers = lasers(&file).unwrap();
             assert_eq!(lasers[0].elevation_rad, 0.125);
             assert_eq!(
@@ -311,11 +330,23 @@ mod tests {
             <px class_id=\"10\"><id_>0</id_><rotCorrection_>180</rotCorrection_><vertCorrection_>-90\
             </vertCorrection_><distCorrection_>140</distCorrection_></px></item></points_></DB>";
         let file = UnitFile::new("db.xml", text);
-        assert!(takes(&file, 1));
+        assert!(has_lasers(&file, 1));
         let laser = lasers(&file).unwrap()[0];
         assert!((laser.rotation_rad - std::f64::consts::PI).abs() < 1e-12);
         assert!((laser.elevation_rad + std::f64::consts::FRAC_PI_2).abs() < 1e-12);
         assert!((laser.distance_m - 1.4).abs() < 1e-12 && laser.min_intensity == 7.0);
+    }
+
+    #[test]
+    fn the_focus_is_in_metres_or_centimetres() {
+        let focus_m = |value: &str| {
+            let text = BLOCK.replace(
+                "vert_correction: 0.125",
+                &format!("vert_correction: 0.125\n    focal_distance: {value}"),
+            );
+            lasers(&UnitFile::new("u", text)).unwrap()[0].focal_distance_m
+        };
+        assert_eq!((focus_m("10.5"), focus_m("1050")), (10.5, 10.5));
     }
 
     #[test]
@@ -329,7 +360,7 @@ mod tests {
         );
         let word = UnitFile::new("u", BLOCK.replace("0.125", "up"));
         assert!(lasers(&word).unwrap_err().to_string().contains("\"up\""));
-        assert!(!takes(&UnitFile::new("u", "lasers: none"), 0));
-        assert!(!takes(&UnitFile::new("u", [0_u8, 1, 2].as_slice()), 0));
+        assert!(!has_lasers(&UnitFile::new("u", "lasers: none"), 0));
+        assert!(!has_lasers(&UnitFile::new("u", [0_u8, 1, 2].as_slice()), 0));
     }
 }

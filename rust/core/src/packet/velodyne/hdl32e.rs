@@ -2,19 +2,17 @@
 //!
 //! Source: HDL-32E manual 63-9113 and application note 63-9277; offsets from the drawing.
 
-use super::rows::{self, Firing};
-use super::{CHANNELS, Packet, calibration, puck};
-use crate::error::UnitError;
+use super::rows::Firing;
+use super::table::Table;
+use super::{CHANNELS, Packet, puck};
 use crate::packet::beams::{Beam, Beams};
-use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Time from one laser to the next.
 pub const LASER_NS: i64 = 1_152;
 /// The factory bytes of firmware before 2.2.20.
 const NO_FACTORY_BYTES: [u8; 2] = [0, 0];
 
-const FIRING: Firing = Firing {
+static FIRING: Firing = Firing {
     lasers: CHANNELS,
     firing_ns: 46_080,
     range_unit_m: 0.002,
@@ -54,7 +52,7 @@ impl Hdl32e {
     }
 }
 
-impl Model for Hdl32e {
+impl Table for Hdl32e {
     fn id(&self) -> &'static str {
         "hdl32e"
     }
@@ -63,48 +61,24 @@ impl Model for Hdl32e {
         "Velodyne HDL-32E"
     }
 
-    fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
-        let packet = Packet::new(payload);
-        let is_old = |packet: &Packet<'_>| {
-            [packet.return_mode_byte(), packet.product()] == NO_FACTORY_BYTES
-                && packet.has_banks(&[0])
-        };
-        if packet.as_ref().is_some_and(is_old) {
-            return Some(PacketKind::Data);
-        }
-        rows::recognise(payload, &[puck::PRODUCT_HDL32E])
+    fn products(&self) -> &'static [u8] {
+        &[puck::PRODUCT_HDL32E]
+    }
+
+    fn sends(&self, packet: &Packet<'_>) -> bool {
+        [packet.return_mode_byte(), packet.product()] == NO_FACTORY_BYTES && packet.has_banks(&[0])
     }
 
     /// Firmware of 2014 of the VLP-16 writes this model's byte as well.
-    fn is_sure(&self, _payload: &[u8]) -> bool {
+    fn is_sure(&self, _product: u8) -> bool {
         false
     }
 
-    fn fits(&self, payload: &[u8]) -> bool {
-        Packet::new(payload).is_some()
+    fn firing(&self) -> &'static Firing {
+        &FIRING
     }
 
-    fn misfit(&self, payload: &[u8]) -> Misfit {
-        super::misfit(payload, self.id())
-    }
-
-    fn head(&self, payload: &[u8]) -> Option<Head> {
-        FIRING.head(payload)
-    }
-
-    fn tally(&self, payload: &[u8]) -> Tally {
-        rows::tally(payload)
-    }
-
-    fn period_ns(&self, mode: ReturnMode) -> i64 {
-        FIRING.period_ns(mode)
-    }
-
-    fn takes(&self, file: &UnitFile) -> bool {
-        calibration::takes(file, CHANNELS)
-    }
-
-    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
-        calibration::fit(files, &Self::beams(), |beams| FIRING.decoder(beams))
+    fn beams(&self) -> Beams {
+        Self::beams()
     }
 }

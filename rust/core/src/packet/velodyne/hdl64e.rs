@@ -168,7 +168,7 @@ impl Model for Hdl64e {
     }
 
     fn takes(&self, file: &UnitFile) -> bool {
-        stream::takes(file) || calibration::takes(file, LASERS)
+        stream::takes(file) || calibration::has_lasers(file, LASERS)
     }
 
     fn gather(&self) -> Option<Box<dyn Gather>> {

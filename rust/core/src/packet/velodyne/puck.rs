@@ -1,14 +1,14 @@
 //! The 16-laser Pucks: VLP-16, Puck LITE and Puck Hi-Res.
 //!
-//! A block holds two firings of all 16 lasers, 55.296 us apart, the lasers 2.304 us apart. //!
+//! A block holds two firings of all 16 lasers, 55.296 us apart, the lasers 2.304 us apart.
+//!
 //! Source: VLP-16 manual 63-9243; elevations and offsets of the Hi-Res from its drawing.
 
-use super::rows::{self, Firing};
-use super::{Packet, calibration};
-use crate::error::{InvalidValue, UnitError};
+use super::rows::Firing;
+use super::table::Table;
+use crate::error::InvalidValue;
+use crate::packet::Decoder;
 use crate::packet::beams::{Beam, Beams};
-use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Decoder, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Lasers of one unit.
 pub const LASERS: usize = 16;
@@ -29,7 +29,7 @@ pub const PRODUCT_HDL32E: u8 = 0x21;
 /// Distance from the spin axis to where the beams cross.
 const FOCAL_DISTANCE_M: f64 = 0.041_91;
 
-const FIRING: Firing = Firing {
+static FIRING: Firing = Firing {
     lasers: LASERS,
     firing_ns: FIRING_NS,
     range_unit_m: RANGE_UNIT_M,
@@ -119,7 +119,7 @@ impl Puck {
     }
 }
 
-impl Model for Puck {
+impl Table for Puck {
     fn id(&self) -> &'static str {
         self.id
     }
@@ -132,40 +132,20 @@ impl Model for Puck {
         self.candidates
     }
 
-    fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
-        rows::recognise(payload, self.products)
+    fn products(&self) -> &'static [u8] {
+        self.products
     }
 
-    fn is_sure(&self, payload: &[u8]) -> bool {
-        Packet::new(payload).is_some_and(|packet| packet.product() != PRODUCT_HDL32E)
+    fn is_sure(&self, product: u8) -> bool {
+        product != PRODUCT_HDL32E
     }
 
-    fn fits(&self, payload: &[u8]) -> bool {
-        Packet::new(payload).is_some()
+    fn firing(&self) -> &'static Firing {
+        &FIRING
     }
 
-    fn misfit(&self, payload: &[u8]) -> Misfit {
-        super::misfit(payload, self.id())
-    }
-
-    fn head(&self, payload: &[u8]) -> Option<Head> {
-        FIRING.head(payload)
-    }
-
-    fn tally(&self, payload: &[u8]) -> Tally {
-        rows::tally(payload)
-    }
-
-    fn period_ns(&self, mode: ReturnMode) -> i64 {
-        FIRING.period_ns(mode)
-    }
-
-    fn takes(&self, file: &UnitFile) -> bool {
-        calibration::takes(file, LASERS)
-    }
-
-    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
-        calibration::fit(files, &self.beams(), |beams| self.decoder(beams))
+    fn beams(&self) -> Beams {
+        self.beams()
     }
 }
 
@@ -174,7 +154,7 @@ mod tests {
     use super::*;
     use crate::cloud::ReturnKind;
     use crate::packet::velodyne::{BLOCKS, RawBlock, RawReturn, encode};
-    use crate::packet::{Decoded, Place};
+    use crate::packet::{Decoded, Place, ReturnMode};
     use crate::time::Timestamp;
 
     #[test]

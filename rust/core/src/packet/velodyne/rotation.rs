@@ -8,7 +8,7 @@ const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
 /// More rows than any packet of the family has.
 const MAX_ROWS: usize = 12;
 /// Steps back by less than this are jitter of the encoder, not a gap of nearly a turn; 0.01 degree.
-const BACKLASH_CENTIDEG: i32 = 100;
+pub const BACKLASH_CENTIDEG: i32 = 100;
 
 /// Rows of one packet: the azimuths that it states and the times that follow from them.
 #[derive(Debug, Clone, Copy)]

@@ -4,8 +4,10 @@
 //! strongest (or the second strongest where the last is the strongest).
 
 use super::lanes::{Lanes, Row};
+use super::reach::Reach;
 use super::rotation::Rotation;
 use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
+use crate::angle::Arc;
 use crate::cloud::{Return, ReturnKind};
 use crate::error::InvalidValue;
 use crate::packet::aim::{turn, wrapped};
@@ -65,6 +67,7 @@ impl Firing {
         let channels = std::array::from_fn(channel);
         Ok(Box::new(RowsDecoder {
             firing: *self,
+            reach: Reach::new(&channels, self.row_ns()),
             lanes: Lanes::new(&channels, self.range_unit_m),
         }))
     }
@@ -154,6 +157,7 @@ impl Channel {
 struct RowsDecoder {
     firing: Firing,
     lanes: Lanes,
+    reach: Reach,
 }
 
 impl Decoder for RowsDecoder {
@@ -185,6 +189,10 @@ impl Decoder for RowsDecoder {
                 self.lanes.push_pairs(row, echoes, out);
             }
         }
+    }
+
+    fn may_meet(&self, payload: &[u8], bearings: Arc) -> bool {
+        Packet::new(payload).is_none_or(|packet| self.reach.meets(&packet, bearings))
     }
 }
 

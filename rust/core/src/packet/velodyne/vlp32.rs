@@ -2,12 +2,10 @@
 //!
 //! Source: VLP-32C manual 63-9325. The timing of the early units is taken to be the same.
 
-use super::rows::{self, Firing};
-use super::{CHANNELS, Packet, calibration};
-use crate::error::UnitError;
+use super::CHANNELS;
+use super::rows::Firing;
+use super::table::Table;
 use crate::packet::beams::{Beam, Beams};
-use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Time from one pair of lasers to the next.
 pub const PAIR_NS: i64 = 2_304;
@@ -18,7 +16,7 @@ pub const PRODUCT_VLP32C: u8 = 0x28;
 /// Distance from the spin axis to where the beams cross.
 const FOCAL_DISTANCE_M: f64 = 0.0424;
 
-const FIRING: Firing = Firing {
+static FIRING: Firing = Firing {
     lasers: CHANNELS,
     firing_ns: 55_296,
     range_unit_m: RANGE_UNIT_M,
@@ -28,7 +26,7 @@ const FIRING: Firing = Firing {
 pub static VLP32C: Vlp32 = Vlp32 {
     id: "vlp32c",
     title: "Velodyne VLP-32C",
-    product: PRODUCT_VLP32C,
+    products: &[PRODUCT_VLP32C],
     elevation_deg: [
         -25.0, -1.0, -1.667, -15.639, -11.31, 0.0, -0.667, -8.843, -7.254, 0.333, -0.333, -6.148,
         -5.333, 1.333, 0.667, -4.0, -4.667, 1.667, 1.0, -3.667, -3.333, 3.333, 2.333, -2.667, -3.0,
@@ -44,7 +42,7 @@ pub static VLP32C: Vlp32 = Vlp32 {
 pub static VLP32A: Vlp32 = Vlp32 {
     id: "vlp32a",
     title: "Velodyne VLP-32A",
-    product: 0x23,
+    products: &[0x23],
     elevation_deg: [
         -14.3, 0.8337, 12.5, -0.5, -10.7, 2.167, 8.9, -1.834, -7.0, 1.167, 6.0, -0.167, -4.9, 2.5,
         3.8, -1.5, -2.167, 10.7, 1.834, -8.9, -2.5, 4.9, 1.5, -3.8, -0.834, 14.3, 0.5, -12.5,
@@ -61,7 +59,7 @@ pub static VLP32A: Vlp32 = Vlp32 {
 pub struct Vlp32 {
     id: &'static str,
     title: &'static str,
-    product: u8,
+    products: &'static [u8],
     elevation_deg: [f64; CHANNELS],
     /// Taken from the encoder azimuth.
     rotation_deg: [f64; CHANNELS],
@@ -90,7 +88,7 @@ impl Vlp32 {
     }
 }
 
-impl Model for Vlp32 {
+impl Table for Vlp32 {
     fn id(&self) -> &'static str {
         self.id
     }
@@ -99,35 +97,15 @@ impl Model for Vlp32 {
         self.title
     }
 
-    fn recognise(&self, payload: &[u8]) -> Option<PacketKind> {
-        rows::recognise(payload, &[self.product])
+    fn products(&self) -> &'static [u8] {
+        self.products
     }
 
-    fn fits(&self, payload: &[u8]) -> bool {
-        Packet::new(payload).is_some()
+    fn firing(&self) -> &'static Firing {
+        &FIRING
     }
 
-    fn misfit(&self, payload: &[u8]) -> Misfit {
-        super::misfit(payload, self.id())
-    }
-
-    fn head(&self, payload: &[u8]) -> Option<Head> {
-        FIRING.head(payload)
-    }
-
-    fn tally(&self, payload: &[u8]) -> Tally {
-        rows::tally(payload)
-    }
-
-    fn period_ns(&self, mode: ReturnMode) -> i64 {
-        FIRING.period_ns(mode)
-    }
-
-    fn takes(&self, file: &UnitFile) -> bool {
-        calibration::takes(file, CHANNELS)
-    }
-
-    fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
-        calibration::fit(files, &self.beams(), |beams| FIRING.decoder(beams))
+    fn beams(&self) -> Beams {
+        self.beams()
     }
 }

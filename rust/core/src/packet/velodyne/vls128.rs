@@ -199,7 +199,7 @@ impl Model for Vls128 {
     }
 
     fn takes(&self, file: &UnitFile) -> bool {
-        calibration::takes(file, LASERS)
+        calibration::takes(file, &Self::beams())
     }
 
     fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {

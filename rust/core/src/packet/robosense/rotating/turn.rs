@@ -24,6 +24,8 @@ pub struct Turn {
     /// Blocks of the last firing that the next packet has.
     tail: usize,
     azimuth_centideg: [u32; MOST],
+    /// Step from each firing to the next.
+    forth_rad: [f64; MOST],
     /// Usual step from firing to firing.
     step_rad: f64,
     /// Width of the gap behind the firing with this number.
@@ -49,6 +51,7 @@ impl Turn {
             lead: 0,
             tail: 0,
             azimuth_centideg: [0; MOST],
+            forth_rad: [0.0; MOST],
             step_rad: 0.0,
             gap: None,
             rate_rad_per_ns: 0.0,
@@ -109,6 +112,10 @@ impl Turn {
             );
             *step = (to + 36_000 - from) % 36_000;
         }
+        for firing in 0..count {
+            let step_rad = self.azimuth_rad(firing + 1) - self.azimuth_rad(firing);
+            self.forth_rad[firing] = step_rad.rem_euclid(TAU);
+        }
         let steps = &steps[..count];
         let mut sorted = [0; MOST];
         sorted[..count].copy_from_slice(steps);
@@ -159,7 +166,7 @@ impl Turn {
         let step_rad = if is_last {
             self.last_step_rad
         } else {
-            (self.azimuth_rad(next) - self.azimuth_rad(firing)).rem_euclid(TAU)
+            self.forth_rad[firing]
         };
         let turned_rad = step_rad * delay_ns as f64 / self.firing_ns;
         if self.is_on_grid {

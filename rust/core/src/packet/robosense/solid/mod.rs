@@ -10,4 +10,5 @@ pub mod columns;
 mod decoder;
 pub mod description;
 pub mod header;
+pub mod joined;
 pub mod sensor;

@@ -8,6 +8,7 @@ use super::columns::Columns;
 use super::decoder::SolidDecoder;
 use super::description::{self, Angles};
 use super::header;
+use super::joined;
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
 use crate::packet::aim::Centidegrees;
@@ -82,9 +83,9 @@ const fn blocks(
 
 /// M1.
 pub static M1: Solid = Solid {
-    id: "rs-m1",
+    id: "m1",
     title: "RoboSense M1",
-    candidates: &["rs-m1-plus"],
+    candidates: &["m1-plus"],
     kind: Some(0x10),
     body: blocks(1210, 25, 47, 1, true, 5, Point::Angles),
     limits: (40, 40_000),
@@ -95,15 +96,32 @@ pub static M1: Solid = Solid {
 };
 /// M1 Plus, when it is named.
 pub static M1_PLUS: Solid = Solid {
-    id: "rs-m1-plus",
+    id: "m1-plus",
     title: "RoboSense M1 Plus",
-    candidates: &["rs-m1"],
+    candidates: &["m1"],
     is_told: false,
+    ..M1
+};
+/// M1 whose packets come joined into large datagrams: points without the two bytes that nothing uses.
+pub static M1_JUMBO: Solid = Solid {
+    id: "m1-jumbo",
+    title: "RoboSense M1 (jumbo)",
+    candidates: &[],
+    body: Body::Blocks(Blocks {
+        len: joined::PIECE_LEN,
+        count: 25,
+        block_len: 37,
+        time_len: 1,
+        has_return: true,
+        points: 5,
+        point: Point::Angles,
+        point_len: 7,
+    }),
     ..M1
 };
 /// M2.
 pub static M2: Solid = Solid {
-    id: "rs-m2",
+    id: "m2",
     title: "RoboSense M2",
     candidates: &[],
     kind: None,
@@ -114,7 +132,7 @@ pub static M2: Solid = Solid {
 };
 /// M3.
 pub static M3: Solid = Solid {
-    id: "rs-m3",
+    id: "m3",
     title: "RoboSense M3",
     body: blocks(1448, 5, 282, 2, false, 28, Point::Vector),
     limits: (20, 60_000),
@@ -123,7 +141,7 @@ pub static M3: Solid = Solid {
 };
 /// MX.
 pub static MX: Solid = Solid {
-    id: "rs-mx",
+    id: "mx",
     title: "RoboSense MX",
     body: blocks(1404, 50, 27, 1, false, 2, Point::Pair),
     limits: (40, 40_000),
@@ -132,7 +150,7 @@ pub static MX: Solid = Solid {
 };
 /// E1.
 pub static E1: Solid = Solid {
-    id: "rs-e1",
+    id: "e1",
     title: "RoboSense E1",
     kind: Some(0x62),
     body: blocks(1200, 96, 12, 2, false, 1, Point::Vector),
@@ -143,7 +161,7 @@ pub static E1: Solid = Solid {
 };
 /// EMX.
 pub static EMX: Solid = Solid {
-    id: "rs-emx",
+    id: "emx",
     title: "RoboSense EMX",
     kind: Some(0x42),
     body: Body::Columns(Columns::Emx),
@@ -154,7 +172,7 @@ pub static EMX: Solid = Solid {
 };
 /// EM4.
 pub static EM4: Solid = Solid {
-    id: "rs-em4",
+    id: "em4",
     title: "RoboSense EM4",
     kind: Some(0x70),
     body: Body::Columns(Columns::Em4),

@@ -1,0 +1,56 @@
+"""The program itself: how soon it answers, and what memory a large capture takes."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import captures
+from rounds import Row, rounds, table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+LARGE = 2_000_000_000
+
+
+def run(*arguments: str | Path) -> None:
+    """Run a command and forget what it says."""
+    command = [sys.executable, "-m", "lidar_deflect", *map(str, arguments)]
+    subprocess.run(command, capture_output=True, check=True)
+
+
+def most_mib(arguments: Sequence[str | Path]) -> float:
+    """Largest memory of a command, MiB."""
+    code = (
+        "import resource, runpy, sys\n"
+        "try: runpy.run_module('lidar_deflect', run_name='__main__', alter_sys=True)\n"
+        "except SystemExit: pass\n"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return int(done.stderr.split()[-1]) / 1024
+
+
+def measure(repeats: int) -> list[Row]:
+    """Print what was found; return what was asked."""
+    timed = rounds({"--help": lambda: run("--help")}, repeats)
+    print(table(timed, 1, "answers", "--help"))
+    small = captures.yard() / "capture.pcap"
+    large = captures.repeated(small, LARGE)
+    memory = [most_mib(["info", path, "--json"]) for path in (small, large)]
+    found = (
+        f"{memory[0]:.0f} MiB for {small.stat().st_size / 1e6:.0f} MB, {memory[1]:.0f} MiB for 2 GB"
+    )
+    print(found)
+    return [
+        Row("--help, warm", "under 0.3 s", f"{timed['--help'].median_s:.2f} s"),
+        Row("memory of `info` on a large capture", "under 1 GB, flat", found),
+    ]

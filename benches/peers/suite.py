@@ -1,0 +1,49 @@
+"""All jobs beside their peers in one run, and the table of what was asked.
+
+PYTHONPATH=python target/peers/bin/python benches/peers/suite.py [--only decode ...] [--repeats 5]
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+from datetime import date
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from rounds import Row
+
+JOBS = ("decode", "ouster", "cluster", "ground", "compressed", "yard", "program")
+
+
+def main() -> None:
+    """Run what is asked for, print the table last."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", choices=JOBS, default=JOBS)
+    parser.add_argument("--repeats", type=int, default=5)
+    options = parser.parse_args()
+    load = os.getloadavg()[0]
+    machine = platform.processor() or platform.machine()
+    print(f"{date.today()}, {machine}, {os.cpu_count()} cores, load {load:.1f}")
+    rows: list[Row] = []
+    for name in options.only:
+        print(f"\n== {name}")
+        try:
+            rows += import_module(name).measure(options.repeats)
+        except ImportError as missing:
+            print(f"left out: {missing}")
+    print("\n" + summary(rows))
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Table for README.md."""
+    lines = ["| job | asked | measured |", "| --- | --- | --- |"]
+    return "\n".join(lines + [f"| {row.job} | {row.asked} | {row.measured} |" for row in rows])
+
+
+if __name__ == "__main__":
+    main()

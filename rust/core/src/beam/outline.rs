@@ -1,0 +1,125 @@
+//! Outlines of material sections as the adjustment has them, with how well each point is known.
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::adjust::{Adjustment, Gates};
+use super::mesh::Mesh;
+use super::posed::Posed;
+use super::sections::Place;
+use crate::error::BeamError;
+
+impl Adjustment {
+    /// By hold, section and point of the outline: x, y, z in metres, averaged over the hold, and the
+    /// standard deviation along the outward normal, metres.
+    ///
+    /// # Errors
+    /// [`BeamError::Singular`].
+    pub fn outlines(&self, s_m: &[f64], gates: &Gates) -> Result<Vec<[f64; 4]>, BeamError> {
+        let count = self.problem.mesh.outline[0].len();
+        let holds = self.problem.holds.len();
+        let mut points = Vec::with_capacity(holds * s_m.len() * count);
+        let mut rows = DMatrix::zeros(self.layout.len(), holds * s_m.len() * count);
+        for hold in 0..holds {
+            let posed = self.posed(hold);
+            for s in s_m {
+                for vertex in 0..count {
+                    let mut place = self.place_at(&posed, hold, *s, None);
+                    self.put_on(&mut place, &posed, hold, vertex);
+                    let column = points.len();
+                    points.push(self.surface_point(&mut rows, column, (&posed, hold), &place));
+                }
+            }
+        }
+        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
+        let solved = factor.solve(&rows);
+        let sigma = |k: usize| rows.column(k).dot(&solved.column(k)).max(0.0).sqrt();
+        let known = points.iter().enumerate();
+        Ok(known.map(|(k, p)| [p.x, p.y, p.z, sigma(k)]).collect())
+    }
+
+    /// Moves a place from the middle of the chord to a point of the outline.
+    fn put_on(&self, place: &mut Place, posed: &Posed, hold: usize, vertex: usize) {
+        let mesh = &self.problem.mesh;
+        let section = place.contact.section;
+        let at = |k: usize| local(mesh, section.node, section.share, k);
+        let count = mesh.outline[0].len();
+        let along = at((vertex + 1) % count) - at((vertex + count - 1) % count);
+        let mut outward = Vector3::new(along.y, -along.x, 0.0).normalize();
+        let middle = (0..count).map(at).sum::<Vector3<f64>>() / count as f64;
+        if outward.dot(&(at(vertex) - middle)) < 0.0 {
+            outward = -outward;
+        }
+        let contact = &mut place.contact;
+        contact.local = at(vertex);
+        contact.point = section.place + section.turn * contact.local;
+        contact.x_c = mesh.x_c[section.node][vertex];
+        contact.vertex = vertex;
+        contact.normal = section.turn * outward;
+        place.point = contact.point;
+        place.point += self.mean_correction((posed, hold), place);
+    }
+
+    /// The point, and its slopes along the normal in a column.
+    fn surface_point(
+        &self,
+        rows: &mut DMatrix<f64>,
+        column: usize,
+        of: (&Posed, usize),
+        place: &Place,
+    ) -> Vector3<f64> {
+        let normal = place.contact.normal;
+        self.fill(rows, column, of, place, &normal, &Vector3::zeros());
+        let mut waves = Vec::new();
+        let (problem, first) = (&self.problem, self.layout.shape_at());
+        let mesh = &problem.mesh;
+        problem
+            .shape
+            .waves(mesh, &place.contact, &normal, first, &mut waves);
+        for (unknown, slope) in waves {
+            rows[(unknown, column)] += slope;
+        }
+        place.point
+    }
+}
+
+/// A point of the outline about the axis, between two nodes, metres.
+fn local(mesh: &Mesh, node: usize, share: f64, vertex: usize) -> Vector3<f64> {
+    let at = |node: usize| {
+        Vector3::new(
+            mesh.outline[node][vertex][0],
+            mesh.outline[node][vertex][1],
+            0.0,
+        )
+    };
+    at(node) * (1.0 - share) + at(node + 1) * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::adjust::Stage;
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn an_outline_surrounds_its_section_and_what_is_seen_is_known_best() {
+        let adjustment = sample::adjustment(0.0);
+        let gates = Gates {
+            echo_m: 0.1,
+            edge_m: 0.1,
+            stage: Stage::All,
+        };
+        let (s_m, count) = (50.0, adjustment.problem.mesh.outline[0].len());
+        let points = adjustment.outlines(&[s_m], &gates).unwrap();
+        assert_eq!(points.len(), count);
+        let middle = adjustment.knowledge(&[s_m], &gates).unwrap().0.values[0];
+        let off = |p: &[f64; 4]| Vector3::new(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]);
+        // The sample's chord at 50 m is 4 - 3.4 * 50 / 60 = 1.17 m: half of it on both sides.
+        let far = points.iter().map(|p| off(p).norm()).fold(0.0, f64::max);
+        assert!((far - 0.58).abs() < 0.03, "{far}");
+        // The lidar stands below: the lower side is nearer to it.
+        let by_height = |a: &&[f64; 4], b: &&[f64; 4]| a[1].total_cmp(&b[1]);
+        let lowest = points.iter().min_by(by_height).unwrap();
+        let highest = points.iter().max_by(by_height).unwrap();
+        assert!(lowest[3] < highest[3], "{lowest:?} {highest:?}");
+    }
+}

@@ -1,0 +1,105 @@
+//! What is known of the unknowns before the data, stage by stage.
+
+use super::adjust::{Adjustment, EDGE_OFFSET_RAD, Stage};
+use super::family::Kind;
+use super::normal::Normal;
+use super::weights::let_go;
+
+/// A stress-free curvature known no better than this has to be found with the loads, rad/m.
+const VAGUE_RAD_M: f64 = 1e-4;
+/// Inverse variance of what is held, against 1 of what is free.
+const HELD: f64 = 1e6;
+/// Edges whose offset keeps less than this share of its weight are let go ...
+const LOOSE: f64 = 0.1;
+/// ... and worth a word beyond this, rad.
+const LOOSE_RAD: f64 = 1e-3;
+
+impl Adjustment {
+    /// Whether no drawing tells how the blade is bent without load.
+    pub(super) fn is_vague(&self) -> bool {
+        self.problem.trust.free_rad_m > VAGUE_RAD_M
+    }
+
+    /// The first stage at which an unknown may change.
+    fn needs(&self, unknown: usize) -> Stage {
+        if unknown >= self.layout.lidar_at(0) {
+            return Stage::All;
+        }
+        let kind = if unknown < self.layout.shared {
+            Some(self.shared[unknown].kind)
+        } else {
+            self.own
+                .iter()
+                .flatten()
+                .nth(unknown - self.layout.shared)
+                .map(|own| own.kind)
+        };
+        match kind {
+            Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
+            Some(Kind::Free { mode: 0 | 1, .. }) if self.is_vague() => Stage::Loads,
+            _ => Stage::Blade,
+        }
+    }
+
+    /// Inverse variance of an unknown before the data.
+    fn tightness_of(&self, unknown: usize) -> f64 {
+        match self.layout.edge_group(unknown) {
+            None => self.tightness[unknown],
+            Some(group) => self.edge_tightness(group),
+        }
+    }
+
+    /// The same of the edge offset of a hold, lidar and side. Its edges share the grid of the shots;
+    /// where they lie far off, what ends the echoes is not the silhouette, and they shall not pull the
+    /// blade.
+    fn edge_tightness(&self, (hold, lidar, side): (usize, usize, usize)) -> f64 {
+        let shared = match self.weights.common.get(hold) {
+            Some(common) => common.side_variance(lidar, side),
+            None => 0.0,
+        };
+        let spread = (1.0 + shared / (EDGE_OFFSET_RAD * EDGE_OFFSET_RAD)).sqrt();
+        let value = self.values[self.layout.edge_offset_at(hold, lidar, side)];
+        let_go(value, spread) / (spread * spread)
+    }
+
+    /// Edges that end where the silhouette is not: hold, lidar, side, and how far outside, rad.
+    pub fn loose_edges(&self) -> Vec<(usize, usize, usize, f64)> {
+        let layout = &self.layout;
+        let groups =
+            (layout.edge_at() + 1..layout.range_at(0)).filter_map(|u| layout.edge_group(u));
+        let offset = |(hold, lidar, side)| {
+            let value = self.values[layout.edge_offset_at(hold, lidar, side)];
+            (hold, lidar, side, value * EDGE_OFFSET_RAD)
+        };
+        let is_loose = |group: &(usize, usize, usize)| self.edge_tightness(*group) < LOOSE;
+        groups
+            .filter(is_loose)
+            .map(offset)
+            .filter(|found| found.3.abs() > LOOSE_RAD)
+            .collect()
+    }
+
+    /// What is known before the data.
+    pub(super) fn prior(&self, stage: Stage) -> Normal {
+        let mut prior = Normal::new(self.free.clone());
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        for (place, i) in self.free.clone().enumerate() {
+            let is_held = self.needs(i) > stage;
+            let tight = if is_held { HELD } else { self.tightness_of(i) };
+            prior.matrix[(place, place)] = tight;
+            prior.right[place] = tight * (self.expected[i] - self.values[i]);
+        }
+        if self.free.contains(&rig) {
+            let at = rig - self.free.start;
+            let hold = if stage == Stage::All { 1.0 } else { HELD };
+            let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
+            let information = &self.rig.information * hold;
+            prior
+                .matrix
+                .view_mut((at, at), (count, count))
+                .copy_from(&information);
+            prior.right.rows_mut(at, count).copy_from(&(pull * hold));
+        }
+        prior
+    }
+}
