@@ -178,6 +178,9 @@ struct RawSurface {
     half_m: [f64; 2],
 }
 
+/// Lidar, target, centre in the sensor's frame (m), its deviations across the ray and along it (m).
+type RawSight = (usize, usize, [f64; 3], [f64; 2], f64);
+
 /// What is known besides the scans, kind by kind.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -188,7 +191,7 @@ struct RawKnown {
     gravity: Vec<(usize, [f64; 3], f64)>,
     distance: Vec<([usize; 2], f64, f64)>,
     target: Vec<(usize, [f64; 3], f64)>,
-    sight: Vec<(usize, usize, [f64; 3], [f64; 2], f64)>,
+    sight: Vec<RawSight>,
 }
 
 fn rotation(rows: &Rows3) -> Rotation3<f64> {
