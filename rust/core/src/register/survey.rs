@@ -256,7 +256,7 @@ mod tests {
         let rows = rows_at(&state, &layout);
         assert!(!rows.is_empty());
         let step = 1e-6;
-        let moved = |border: usize, nodes: usize| {
+        let moved = |border: usize, nodes: usize, step: f64| {
             let mut steps = (vec![0.0; layout.border], vec![0.0; layout.nodes]);
             if border < layout.border {
                 steps.0[border] = step;
@@ -270,21 +270,24 @@ mod tests {
         let near =
             |found: f64, numeric: f64| (found - numeric).abs() < 2e-5 * (1.0 + numeric.abs());
         for unknown in 0..layout.border {
-            for (row, after) in rows.iter().zip(moved(unknown, 0)) {
+            let sides = moved(unknown, 0, -step)
+                .into_iter()
+                .zip(moved(unknown, 0, step));
+            for (row, (before, after)) in rows.iter().zip(sides) {
                 let found: f64 = row
                     .border
                     .iter()
                     .filter(|(i, _)| *i == unknown)
                     .map(|e| e.1)
                     .sum();
-                let numeric = (after.residual - row.residual) / step;
+                let numeric = (after.residual - before.residual) / (2.0 * step);
                 assert!(near(found, numeric), "unknown {unknown}: {found} {numeric}");
             }
         }
         for (row, k) in rows.iter().zip(0..) {
             for (node, found) in &row.field {
-                let after = &moved(layout.border, *node)[k];
-                let numeric = (after.residual - row.residual) / step;
+                let side = |step| moved(layout.border, *node, step)[k].residual;
+                let numeric = (side(step) - side(-step)) / (2.0 * step);
                 assert!(near(*found, numeric), "node {node}: {found} {numeric}");
             }
         }
