@@ -6,6 +6,7 @@ from pathlib import Path
 
 import polars as pl
 import pytest
+import tomlkit
 
 from conftest import command_line
 from lidar_deflect import capture as captures
@@ -98,6 +99,22 @@ def test_schema_prints_json_schemas() -> None:
 def test_check_accepts_what_simulate_writes(short_test: Path) -> None:
     done = command_line("check", short_test / "capture.pcap", "-c", short_test / "test.toml")
     assert done.code == 0, done.out + done.err
+
+
+def test_poses_without_a_wall_are_written_and_exit_with_six(
+    short_test: Path, tmp_path: Path
+) -> None:
+    document = tomlkit.parse((short_test / "test.toml").read_text(encoding="utf-8"))
+    document["control"] = [p for p in document.unwrap()["control"] if p["on"] == "ground"]
+    toml = short_test / "no-wall.toml"  # beside the files that it names
+    toml.write_text(tomlkit.dumps(document), encoding="utf-8")
+    done = command_line(
+        "calibrate", short_test / "capture.pcap", "-c", toml, "-o", tmp_path / "calibration.toml"
+    )
+    assert done.code == 6, done.err
+    assert "verdict: poor" in done.out
+    assert "free to turn about the vertical (yaw)" in done.out
+    assert (tmp_path / "calibration.toml").exists()
 
 
 def test_the_road_from_capture_to_report(short_test: Path, tmp_path: Path) -> None:

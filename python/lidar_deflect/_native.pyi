@@ -504,13 +504,22 @@ class StaticHold:
     def ground(
         self, up_in_sensor: NDArray[np.float64]
     ) -> tuple[tuple[float, float, float], float] | None: ...
+    def turn_to_targets(
+        self,
+        levelled: Sequence[Sequence[float]],
+        targets: Sequence[tuple[Sequence[float], float]],
+        range_rad: float,
+    ) -> tuple[float, int] | None: ...
+    def sheet(
+        self, expected_m: Sequence[float], size_m: float, within_m: float
+    ) -> tuple[tuple[float, float, float], tuple[float, float], int] | None: ...
     def __len__(self) -> int: ...
 
 def adjust_network(
     holds: Sequence[StaticHold],
     lidars: Sequence[Mapping[str, Any]],
     surfaces: Sequence[Mapping[str, Any]],
-    targets: Sequence[Sequence[float]],
+    targets: Sequence[tuple[Sequence[float], float | None]],
     known: Mapping[str, Any],
     *,
     priors: Sequence[float],

@@ -31,8 +31,8 @@ NO_DATUM = (
 )
 
 TARGETS_UNUSED = (
-    "{count} surveyed targets are not used: no target is searched for in the points yet, ground "
-    "and wall points fix the poses"
+    "{count} surveyed targets are not used: lidars that are registered one by one "
+    "(closed_form) know ground and wall alone"
 )
 
 
@@ -47,12 +47,6 @@ def calibrate(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
         If ground or wall of a lidar cannot be found, or a direction of a pose is left free; the
         error names it.
     """
-    found = _by_method(config, clouds)
-    unused = (TARGETS_UNUSED.format(count=len(config.targets)),) if config.targets else ()
-    return replace(found, warnings=(*unused, *found.warnings))
-
-
-def _by_method(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
     if config.calibrate.method == "closed_form":
         return closed_form(config, clouds)
     if not network.can_solve(config):
@@ -66,7 +60,8 @@ def closed_form(config: Config, clouds: Mapping[str, HoldCloud]) -> Calibration:
     wall = _surveyed_wall(config)
     poses = tuple(_pose(config, config.lidar(id), cloud, wall) for id, cloud in clouds.items())
     warnings = () if wall is not None else (NO_WALL,)
-    return Calibration(poses, "closed_form", warnings + _slope_warning(config))
+    unused = (TARGETS_UNUSED.format(count=len(config.targets)),) if config.targets else ()
+    return Calibration(poses, "closed_form", unused + warnings + _slope_warning(config))
 
 
 def _pose(config: Config, lidar: Lidar, cloud: HoldCloud, wall: Wall | None) -> Pose:

@@ -15,7 +15,7 @@ from lidar_deflect.files import whole_file, write_text
 from lidar_deflect.notebook import card
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
@@ -190,8 +190,14 @@ class Calibration:
             x, y, z = pose.position_m
             lines.append(f"  {pose.id:8} at {x:9.3f} {y:8.3f} {z:9.3f} m")
             lines += [f"    {name}: {_said(value)}" for name, value in pose.evidence.items()]
+        lines += _evidence_lines(self.evidence)
         lines += [f"  warning: {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    @property
+    def is_poor(self) -> bool:
+        """Whether the verdict of the adjustment is that no pose of it deserves trust."""
+        return str(self.evidence.get("verdict", "")).startswith("poor")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain document of `calibration.toml`."""
@@ -284,6 +290,26 @@ def _plain(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_plain(entry) for entry in value]
     return value.item() if isinstance(value, np.generic) else value
+
+
+def _evidence_lines(evidence: Mapping[str, Any]) -> Iterator[str]:
+    """Say what all poses together rest on: surfaces, survey, targets, verdict."""
+    for surface in evidence.get("surfaces", ()):
+        rough_mm = surface.get("roughness_mm", 0.0)
+        yield f"  {surface['name']}: rough by {rough_mm:.1f} mm"
+    survey = evidence.get("survey", ())
+    if survey:
+        worst = max(survey, key=lambda entry: max(map(abs, entry["studentised"])))
+        size = max(map(abs, worst["studentised"]))
+        yield f"  survey: {len(survey)} values, the worst {worst['what']} ({size:.1f} sigma)"
+    for target in evidence.get("targets", ()):
+        seen = ", ".join(f"{id} {count}" for id, count in target["echoes"].items())
+        yield f"  target {target['name']}: {seen or 'not seen'}"
+    if "u_flapwise_mm_per_10_m" in evidence:
+        turn, shift = evidence["u_common_roll_mrad"], evidence["u_flapwise_mm_per_10_m"]
+        yield f"  all lidars about z: {turn:.2f} mrad, {shift:.1f} mm in 10 m of deflection (k = 1)"
+    if "verdict" in evidence:
+        yield f"  verdict: {evidence['verdict']}"
 
 
 def _said(value: Any) -> str:

@@ -23,6 +23,9 @@ FREE_RAD, FREE_M = 0.3, 30.0
 HELD_RAD, HELD_M = 5e-3, 0.1
 """A direction known no better than this rests on a prior, not on an observation of the yard."""
 
+COUPLED = 0.5
+"""A free direction has a part along every axis that is larger than this share of its largest."""
+
 GOOD_RAD, GOOD_M = 1e-3, 6e-3
 """Poses as good as this across ground and walls deserve the verdict."""
 
@@ -58,7 +61,12 @@ def calibration(config: Config, solution: Solution) -> Calibration:
         )
     lidars = [config.lidar(id) for id in solution.lidars]
     poses = tuple(_pose(lidar, solution, number, covariance) for number, lidar in enumerate(lidars))
-    warnings = (*_held(solution, covariance), *_left_out(config, solution), *_unsettled(solution))
+    warnings = (
+        *_held(solution, covariance),
+        *_left_out(config, solution),
+        *_not_found(config, solution),
+        *_unsettled(solution),
+    )
     evidence = {"verdict": _verdict(covariance, warnings)} | _evidence(config, solution)
     return Calibration(poses, "network", warnings, {}, _joint(solution), evidence)
 
@@ -74,14 +82,23 @@ def _joint(solution: Solution) -> Joint:
 def _loose(
     lidars: Sequence[str], covariance: NDArray[np.float64], most_rad: float, most_m: float
 ) -> Iterator[tuple[str, str, str]]:
-    """Lidar, direction in words and what would fix it, wherever a sigma is larger."""
-    sigma = np.sqrt(np.diag(covariance)).reshape(-1, 6)
-    for id, own in zip(lidars, sigma, strict=True):
-        for axis in range(3):
-            if own[axis] > most_rad:
-                yield id, f"to turn {TURNS[axis][0]}", TURNS[axis][1]
-            if own[3 + axis] > most_m:
-                yield id, f"to shift {SHIFTS[axis][0]}", SHIFTS[axis][1]
+    """Lidar, direction in words and what would fix it, of every eigenvector that is less sure."""
+    limits = np.repeat([most_rad, most_m], 3)
+    for number, id in enumerate(lidars):
+        own = slice(6 * number, 6 * number + 6)
+        squares, vectors = np.linalg.eigh(covariance[own, own] / np.outer(limits, limits))
+        for square, vector in zip(squares[::-1], vectors.T[::-1], strict=True):
+            if square > 1.0:
+                yield id, *_in_words(vector)
+
+
+def _in_words(direction: NDArray[np.float64]) -> tuple[str, str]:
+    """Say where a direction of a pose goes, its largest part first, and what would fix that."""
+    words = [(f"to turn {turn}", remedy) for turn, remedy in TURNS]
+    words += [(f"to shift {shift}", remedy) for shift, remedy in SHIFTS]
+    size = np.abs(direction)
+    parts = [k for k in np.argsort(-size) if size[k] > COUPLED * size.max()]
+    return " and with it ".join(words[k][0] for k in parts), words[parts[0]][1]
 
 
 def _held(solution: Solution, covariance: NDArray[np.float64]) -> Iterator[str]:
@@ -128,6 +145,32 @@ def named(config: Config, solution: Solution) -> Iterator[tuple[str, Sequence[tu
     for tape, rows in zip(solution.known["distance"], solution.raw["distance"], strict=True):
         ids = [solution.lidars[index] for index in tape[0]]
         yield f"distance {ids[0]}-{ids[1]}", rows
+    for target, rows in zip(config.targets, solution.raw["target"], strict=True):
+        yield f"target {target.name}", rows
+    for sight, rows in zip(solution.known["sight"], solution.raw["sight"], strict=True):
+        yield f"target {config.targets[sight[1]].name} as {solution.lidars[sight[0]]} sees it", rows
+
+
+def seen_by(config: Config, solution: Solution) -> dict[str, dict[str, int]]:
+    """Count the echoes of every target, by the lidars that see it."""
+    counts: dict[str, dict[str, int]] = {target.name: {} for target in config.targets}
+    for lidar, target, count, _ in solution.raw["seen"]:
+        counts[config.targets[target].name][solution.lidars[lidar]] = count
+    sheets = (solution.known["sight"], solution.raw["sight"], solution.known["sheet_echoes"])
+    for (lidar, target, *_), rows, (count,) in zip(*sheets, strict=True):
+        if not any(row[4] for row in rows):
+            counts[config.targets[target].name][solution.lidars[lidar]] = count
+    return counts
+
+
+def _not_found(config: Config, solution: Solution) -> Iterator[str]:
+    """Name the targets that no lidar sees."""
+    for name, seen in seen_by(config, solution).items():
+        if not seen:
+            yield (
+                f"target {name} is seen by no lidar within its place: is it uncovered, "
+                "as large as size_m, and are its coordinates right?"
+            )
 
 
 def refuse_exchanged(config: Config, solution: Solution) -> None:
@@ -174,8 +217,9 @@ def _pose_evidence(
     evidence: dict[str, Any] = {
         "u_rotation_mrad": (1e3 * sigma[:3]).round(3).tolist(),
         "u_position_mm": (1e3 * sigma[3:]).round(2).tolist(),
-        "ground_height_m": _ground_height_m(solution, number),
     }
+    if any(surface.name == "ground" for surface in solution.surfaces):
+        evidence["ground_height_m"] = _ground_height_m(solution, number)
     for index, surface in enumerate(solution.surfaces):
         on = raw["residuals"][mine & (raw["met_surface"] == index), 0]
         kept = on[np.isfinite(on)]
@@ -209,6 +253,10 @@ def _evidence(config: Config, solution: Solution) -> dict[str, Any]:
         "channel_offset_u_mm": 1e3 * solution.raw["offset_u_m"],
         "steps": solution.raw["steps"],
         "converged": solution.raw["converged"],
+        "targets": [
+            {"name": name, "echoes": seen} for name, seen in seen_by(config, solution).items()
+        ],
+        "retro_offset_mm": [round(1e3 * lidar["retro_m"], 2) for lidar in solution.raw["lidars"]],
         "surfaces": [
             {"name": surface.name, **_surface(raw)}
             for surface, raw in zip(solution.surfaces, solution.raw["surfaces"], strict=True)

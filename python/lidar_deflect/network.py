@@ -16,14 +16,14 @@ import numpy as np
 from lidar_deflect import _native
 from lidar_deflect.errors import CalibrationError
 from lidar_deflect.mounting import mounted, optical_centre_m
-from lidar_deflect.registration import rotation_onto, surveyed_plane
+from lidar_deflect.registration import UP, rotation_onto, surveyed_plane
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from numpy.typing import NDArray
 
-    from lidar_deflect.config import Config, Lidar
+    from lidar_deflect.config import Config, Lidar, Target
     from lidar_deflect.measurement.unloaded import HoldCloud
 
 STEP_DEG = 0.1
@@ -39,6 +39,12 @@ WALL_MARGIN_M = 5.0
 
 WALL_HEIGHT_M = 0.5
 """The search for a wall leaves out what lies lower above the ground than this."""
+
+SHEET_ALONG_U_M = 0.03
+"""Range to a retroreflecting sheet is trusted to this: its strong echo falsifies it."""
+
+SHEET_NEAR_M, SHEET_NEAR_RAD = 0.3, 0.03
+"""A sheet is looked for this near to its place, and this much more per metre of range."""
 
 KINDS = ("control", "position", "mounting", "gravity", "distance", "target", "sight")
 
@@ -113,8 +119,8 @@ class Solution:
 
 
 def can_solve(config: Config) -> bool:
-    """Whether the survey holds a datum: three or more points on the ground."""
-    return sum(point.on == "ground" for point in config.control) >= 3
+    """Whether the survey holds a datum: three or more points on the ground, or targets."""
+    return sum(point.on == "ground" for point in config.control) >= 3 or len(config.targets) >= 3
 
 
 def solve(config: Config, clouds: Mapping[str, HoldCloud | _native.StaticHold]) -> Solution:
@@ -139,8 +145,11 @@ def solve(config: Config, clouds: Mapping[str, HoldCloud | _native.StaticHold]) 
     ids = tuple(clouds)
     holds = [_hold(cloud) for cloud in clouds.values()]
     lidars = [config.lidar(id) for id in ids]
-    starts = [first_pose(lidar, hold, surfaces) for lidar, hold in zip(lidars, holds, strict=True)]
-    known = _known(config, lidars, surfaces)
+    starts = [
+        first_pose(lidar, hold, surfaces, config.targets)
+        for lidar, hold in zip(lidars, holds, strict=True)
+    ]
+    known = _known(config, lidars, surfaces) | _sights(config.targets, holds, starts)
     raw = _native.adjust_network(
         holds,
         [
@@ -151,7 +160,10 @@ def solve(config: Config, clouds: Mapping[str, HoldCloud | _native.StaticHold]) 
             {"origin_m": s.origin_m.tolist(), "normal": s.normal.tolist(), "half_m": s.half_m()}
             for s in surfaces
         ],
-        [],
+        [
+            (list(target.xyz_m), target.size_m / 2 if target.kind == "sphere" else None)
+            for target in config.targets
+        ],
         known,
         priors=[
             config.calibrate.channel_offset_u_m,
@@ -182,7 +194,12 @@ def _hold(cloud: HoldCloud | _native.StaticHold) -> _native.StaticHold:
     if isinstance(cloud, _native.StaticHold):
         return cloud
     return _native.StaticHold.add_up(
-        cloud.xyz, cloud.ring, cloud.azimuth_deg, None, step_deg=STEP_DEG, min_count=MIN_COUNT
+        cloud.xyz,
+        cloud.ring,
+        cloud.azimuth_deg,
+        cloud.intensity,
+        step_deg=STEP_DEG,
+        min_count=MIN_COUNT,
     )
 
 
@@ -192,26 +209,32 @@ def _channels(hold: _native.StaticHold) -> int:
 
 
 def first_pose(
-    lidar: Lidar, hold: _native.StaticHold, surfaces: Sequence[Surface]
+    lidar: Lidar,
+    hold: _native.StaticHold,
+    surfaces: Sequence[Surface],
+    targets: Sequence[Target] = (),
 ) -> NDArray[np.float64]:
-    """Pose of one lidar in closed form, shape (4, 4): the given one, else ground and wall."""
+    """Pose of one lidar in closed form, shape (4, 4): the given one, else ground, wall, targets."""
     if lidar.world_from_sensor:
         return np.array(lidar.world_from_sensor, dtype=np.float64)
     rotation = mounted(
         lidar, hint="give position_m and axes of every lidar, or a world_from_sensor to start from"
     )
-    ground = next(surface for surface in surfaces if surface.name == "ground")
-    seen = hold.ground(rotation.T @ ground.normal)
+    up = next((surface.normal for surface in surfaces if surface.name == "ground"), UP)
+    seen = hold.ground(rotation.T @ up)
     if seen is None:
         raise CalibrationError(
             f"lidar {lidar.id} sees no ground where its axes put it",
             code="calibration.no_ground",
             hint="check the axes of this lidar",
         )
-    rotation = rotation_onto(rotation @ np.array(seen[0]), ground.normal) @ rotation
+    rotation = rotation_onto(rotation @ np.array(seen[0]), up) @ rotation
     pose = np.eye(4)
     pose[:3, 3] = optical_centre_m(lidar, rotation)
-    pose[:3, :3] = _turned_to_walls(rotation, pose[:3, 3], lidar, hold, surfaces, abs(seen[1]))
+    turned = _turned_to_walls(rotation, pose[:3, 3], lidar, hold, surfaces, abs(seen[1]))
+    if turned is None:
+        turned = _turned_to_targets(rotation, pose[:3, 3], lidar, hold, targets)
+    pose[:3, :3] = rotation if turned is None else turned
     return pose
 
 
@@ -222,7 +245,7 @@ def _turned_to_walls(
     hold: _native.StaticHold,
     surfaces: Sequence[Surface],
     beneath_m: float,
-) -> NDArray[np.float64]:
+) -> NDArray[np.float64] | None:
     """Turn a levelled lidar about the vertical until the first wall it sees is in place."""
     beams = hold.beams()
     points = (beams["direction"] * beams["range_m"][:, None]) @ rotation.T
@@ -240,7 +263,46 @@ def _turned_to_walls(
         except CalibrationError:
             continue
         return np.asarray(_native.rotation_about_up(yaw_rad) @ rotation)
-    return rotation
+    return None
+
+
+def _turned_to_targets(
+    rotation: NDArray[np.float64],
+    position_m: NDArray[np.float64],
+    lidar: Lidar,
+    hold: _native.StaticHold,
+    targets: Sequence[Target],
+) -> NDArray[np.float64] | None:
+    """Turn a levelled lidar about the vertical until what is bright lies on targets."""
+    found = hold.turn_to_targets(
+        rotation.tolist(),
+        [((np.array(t.xyz_m) - position_m).tolist(), t.size_m / 2) for t in targets],
+        float(np.radians(2.0 * lidar.axes_u_deg)),
+    )
+    if found is None:
+        return None
+    return np.asarray(_native.rotation_about_up(found[0]) @ rotation)
+
+
+def _sights(
+    targets: Sequence[Target],
+    holds: Sequence[_native.StaticHold],
+    starts: Sequence[NDArray[np.float64]],
+) -> dict[str, list[tuple[Any, ...]]]:
+    """Survey of all targets, and the sheets as each lidar sees them; spheres are met by rays."""
+    surveyed = [(k, list(t.xyz_m), t.u_m) for k, t in enumerate(targets)]
+    sheets = [(k, target) for k, target in enumerate(targets) if target.kind == "sheet"]
+    sights: list[tuple[Any, ...]] = []
+    echoes: list[tuple[Any, ...]] = []
+    for number, (hold, pose) in enumerate(zip(holds, starts, strict=True)):
+        for k, target in sheets:
+            expected = pose[:3, :3].T @ (np.array(target.xyz_m) - pose[:3, 3])
+            within_m = SHEET_NEAR_M + SHEET_NEAR_RAD * float(np.linalg.norm(expected))
+            found = hold.sheet(expected.tolist(), target.size_m, within_m)
+            if found is not None:
+                sights.append((number, k, *found[:2], SHEET_ALONG_U_M))
+                echoes.append((found[2],))
+    return {"target": surveyed, "sight": sights, "sheet_echoes": echoes}
 
 
 def _known(

@@ -91,18 +91,7 @@ def _lidar(
 
 def _references(case: Case, ground: dict[str, Any], random: np.random.Generator) -> dict[str, Any]:
     if case.yard == "targets":
-        places = [(x, z) for x in (-8.0, 10.0) for z in (88.0, 98.0, 108.0)]
-        return {
-            "targets": [
-                {
-                    "name": f"T{i + 1}",
-                    "kind": "sphere",
-                    "size_m": 0.4,
-                    "position_m": (x, _height_m(ground, x, z) + float(random.uniform(1, 3)), z),
-                }
-                for i, (x, z) in enumerate(places)
-            ]
-        }
+        return {"targets": _targets(ground, random)}
     bent = case.yard == "bent wall"
     return {
         "wall": {
@@ -113,3 +102,20 @@ def _references(case: Case, ground: dict[str, Any], random: np.random.Generator)
             "lean": float(random.normal(0.0, 0.003)) if bent else 0.0,
         }
     }
+
+
+def _targets(ground: dict[str, Any], random: np.random.Generator) -> list[dict[str, Any]]:
+    """Six spheres where rings go: two beside each lidar, two far out between both."""
+    middle = 94.0 + 0.5 * APART_M
+    beside = [
+        (x, 94.0 + APART_M * i + (1.0 if x > 0 else -1.0)) for i in range(2) for x in (-6, 12)
+    ]
+    return [
+        {
+            "name": f"T{i + 1}",
+            "kind": "sphere",
+            "size_m": 0.4,
+            "position_m": (x, _height_m(ground, x, z) + float(random.uniform(1, 3)), z),
+        }
+        for i, (x, z) in enumerate([*beside, (-15.0, middle), (21.0, middle)])
+    ]

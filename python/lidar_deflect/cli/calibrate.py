@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from lidar_deflect.cli.measure import QUALITY
 from lidar_deflect.cli.options import (
     Beams,
     Captures,
@@ -45,10 +46,10 @@ def calibrate(
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
-) -> None:
+) -> int:
     """Find the poses of all lidars.
 
-    From captures of the unloaded blade.
+    From captures of the unloaded blade. Exits with 6 where the verdict on the poses is poor.
     """
     talk = Talk(as_json=json, quiet=quiet, verbose=verbose)
     free(out, overwrite)
@@ -66,3 +67,4 @@ def calibrate(
     document = {"schema": SCHEMA, "out": str(out), "calibration": calibration.to_dict()}
     talk.result(document, calibration.summary())
     talk.note(f"written: {out}")
+    return QUALITY if calibration.is_poor else 0

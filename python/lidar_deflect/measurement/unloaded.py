@@ -34,13 +34,15 @@ class HoldCloud:
 
     Attributes
     ----------
-    xyz, ring, azimuth_deg
-        Shapes (n, 3), (n,), (n,), in the order of the shots.
+    xyz, ring, azimuth_deg, intensity
+        Shapes (n, 3), (n,), (n,), (n,), in the order of the shots; without intensities no target
+        is found.
     """
 
     xyz: NDArray[np.float32]
     ring: NDArray[np.uint16]
     azimuth_deg: NDArray[np.float32]
+    intensity: NDArray[np.float32] | None = None
 
 
 def unloaded_hold(candidates: Sequence[Hold], span_ns: tuple[int, int]) -> Hold | None:
@@ -106,6 +108,7 @@ def collect(capture: Capture, lidar: str, window: tuple[int, int]) -> HoldCloud:
         np.concatenate([sweep.xyz for sweep in sweeps]),
         np.concatenate([sweep.ring for sweep in sweeps]),
         np.concatenate([sweep.azimuth_deg for sweep in sweeps]),
+        np.concatenate([sweep.intensity for sweep in sweeps]).astype(np.float32),
     )
 
 

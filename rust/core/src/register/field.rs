@@ -102,7 +102,9 @@ const HALO: usize = 2;
 /// Nodes per correlation length.
 const NODES_PER_LENGTH: f64 = 3.0;
 /// A grid has at most so many places for nodes: coarser where the surface is larger.
-const MOST_NODES: f64 = 60_000.0;
+const MOST_NODES: f64 = 16_000.0;
+/// Share of the roughness that a blend between nodes one correlation length apart does not follow.
+const BETWEEN_NODES: f64 = 0.9;
 
 impl Field {
     /// A field at rest that covers the places (u, v), metres.
@@ -165,6 +167,12 @@ impl Field {
     /// Distance between neighbouring nodes, metres.
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
+    }
+
+    /// Standard deviation of what a blend between nodes does not follow, metres.
+    pub fn between_m(&self) -> f64 {
+        let apart = self.spacing_m / self.roughness.correlation_m;
+        (BETWEEN_NODES * apart).min(1.0) * self.roughness.sigma_m
     }
 
     /// Number of nodes.

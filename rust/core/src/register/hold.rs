@@ -23,6 +23,13 @@ const SHRINKAGE: f64 = 8.0;
 const QUANTILE: f64 = 0.35;
 const QUANTILE_TO_SIGMA: f64 = 2.2;
 
+/// Echoes brighter than this quantile of the mean rays by this factor are bright: a retroreflector
+/// outshines what is matt, and covers less of the view than what is left above the quantile.
+const BRIGHT_QUANTILE: f64 = 0.9;
+const BRIGHT: f32 = 1.5;
+/// More bright echoes than this are thinned.
+const MOST_BRIGHT: usize = 40_000;
+
 /// The mean ray of one channel within one azimuth cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
@@ -71,6 +78,8 @@ impl HoldParams {
 pub struct Hold {
     /// Mean rays, by ring and azimuth.
     pub beams: Vec<Beam>,
+    /// Single echoes that are brighter than the yard: what targets are looked for in.
+    pub bright: Vec<Beam>,
     /// Azimuth cells of a full turn.
     pub cells: u32,
     /// Cells without a clear range: something moved, or an edge ran through.
@@ -127,7 +136,10 @@ pub fn of_rays(
         });
     let mut beams = rays.collect::<Result<Vec<_>, InvalidValue>>()?;
     beams.sort_by_key(|b| (b.ring, b.cell));
+    let limit = brightness(&beams).unwrap_or(f32::INFINITY);
+    let bright = beams.iter().filter(|b| b.intensity > limit);
     Ok(Hold {
+        bright: bright.copied().collect(),
         beams,
         cells,
         ..Hold::default()
@@ -176,8 +188,41 @@ pub fn add_up(echoes: &Echoes<'_>, params: &HoldParams) -> Hold {
             hold.unclear += 1;
         }
     }
-    settle_scatter(&mut hold.beams, &degrees);
+    let single_m = settle_scatter(&mut hold.beams, &degrees);
+    hold.bright = bright(echoes, &hold.beams, single_m, params.step_deg);
     hold
+}
+
+/// The brightest echoes one by one; none where intensities are not known.
+fn bright(echoes: &Echoes<'_>, beams: &[Beam], sigma_m: f64, step_deg: f64) -> Vec<Beam> {
+    let Some(limit) = brightness(beams).filter(|_| !echoes.intensity.is_empty()) else {
+        return Vec::new();
+    };
+    let single = |k: usize| {
+        let point = vector(&echoes.xyz_m[k]);
+        let direction = Unit::try_new(point, 0.05)?;
+        Some(Beam {
+            direction,
+            range_m: point.norm(),
+            sigma_m,
+            intensity: echoes.intensity[k],
+            ring: *echoes.ring.get(k)?,
+            cell: (f64::from(*echoes.azimuth_deg.get(k)?).rem_euclid(360.0) / step_deg) as u32,
+        })
+    };
+    let above = echoes.intensity.iter().enumerate();
+    let above = above.filter(|(_, intensity)| **intensity > limit);
+    let found: Vec<Beam> = above.filter_map(|(k, _)| single(k)).collect();
+    let thin = found.len().div_ceil(MOST_BRIGHT).max(1);
+    found.into_iter().step_by(thin).collect()
+}
+
+/// Intensity above which an echo is bright; None where nothing has any.
+fn brightness(beams: &[Beam]) -> Option<f32> {
+    let mut all: Vec<f32> = beams.iter().map(|b| b.intensity).collect();
+    all.sort_by(f32::total_cmp);
+    let matt = *all.get((BRIGHT_QUANTILE * all.len() as f64) as usize)?;
+    (matt > 0.0).then_some(BRIGHT * matt)
 }
 
 fn keyed(echoes: &Echoes<'_>, step_deg: f64, cells: u32) -> Vec<Echo> {
@@ -244,8 +289,8 @@ fn mean_ray(cell: &[Echo], echoes: &Echoes<'_>) -> Option<(Beam, f64)> {
 }
 
 /// Turns the scatter of single echoes into that of means. A handful of echoes says little of its own
-/// scatter, so it is drawn towards the median of all cells.
-fn settle_scatter(beams: &mut [Beam], counts: &[f64]) {
+/// scatter, so it is drawn towards the median of all cells, which is returned.
+fn settle_scatter(beams: &mut [Beam], counts: &[f64]) -> f64 {
     let mut all: Vec<f64> = beams.iter().map(|b| b.sigma_m).collect();
     all.sort_by(f64::total_cmp);
     let common = all.get(all.len() / 2).copied().unwrap_or(0.0).max(1e-4);
@@ -255,6 +300,7 @@ fn settle_scatter(beams: &mut [Beam], counts: &[f64]) {
             (own * beam.sigma_m.powi(2) + SHRINKAGE * common * common) / (own + SHRINKAGE);
         beam.sigma_m = (variance / count).sqrt();
     }
+    common
 }
 
 #[cfg(test)]

@@ -9,6 +9,10 @@ const REFUSED: f64 = 6.0;
 /// sixteen thousand by chance.
 pub const GROSS: f64 = 4.0;
 
+/// An observation of which nothing else tells more than this share of an error cannot be judged by its
+/// residual: what is left of it is the last step of the adjustment.
+const LEAST_REDUNDANCY: f64 = 0.01;
+
 /// One row of what was known.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Judged {
@@ -31,7 +35,7 @@ pub fn judged(row: &Row, variance: f64, left_out: bool) -> Judged {
     let left = if left_out {
         own + variance
     } else {
-        (own - variance).max(1e-6 * own)
+        (own - variance).max(LEAST_REDUNDANCY * own)
     };
     Judged {
         residual: row.residual,
@@ -61,4 +65,28 @@ pub fn share(row: &Row) -> f64 {
 /// The same of what may be wrong by a little only.
 pub fn doubted(row: &Row) -> f64 {
     (DOUBTED * row.sigma / row.residual.abs()).min(1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(residual: f64) -> Row {
+        Row {
+            residual,
+            sigma: 0.005,
+            ..Row::default()
+        }
+    }
+
+    #[test]
+    fn what_nothing_else_tells_of_is_no_gross_error() {
+        // A position that alone holds its lidar: its variance is its own but for the last digits.
+        let alone = judged(&row(0.02 * 0.005), 0.005f64.powi(2) * (1.0 - 1e-9), false);
+        assert!(alone.studentised < GROSS);
+        // Three quarters of a gross error of 50 mm show where all else is twice as good.
+        let wrong = judged(&row(0.0375), 0.005f64.powi(2) / 4.0, false);
+        assert!((wrong.redundancy - 0.75).abs() < 1e-12);
+        assert!(wrong.studentised > GROSS);
+    }
 }

@@ -15,5 +15,6 @@ pub mod start;
 pub mod state;
 pub mod surface;
 pub mod survey;
+pub mod target;
 pub mod variogram;
 pub mod wall;

@@ -4,7 +4,7 @@
 //! surfaces with their bend and roughness, and targets are found together by robust Gauss-Newton; the
 //! joint covariance of all of it follows from the same normal equations.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use nalgebra::{DMatrix, Vector3};
@@ -14,11 +14,12 @@ use super::field::Field;
 use super::hold::Hold;
 use super::judged::{GROSS, Judged, doubted, judged, largest, share};
 use super::normal::{Normal, Solved};
-use super::rows::{self, Row};
+use super::rows::{self, Place, Row};
 use super::select::{self, Gate, Met};
 use super::state::{Layout, State, Term};
 use super::surface::Surface;
 use super::survey::Known;
+use super::target::{self, OnSphere};
 use super::variogram::{self, Sample};
 use crate::error::{Coded, InvalidValue};
 
@@ -39,19 +40,17 @@ const BEND_U_M: f64 = 0.02;
 const STEPS: usize = 12;
 /// An adjustment has settled when no pose moves by more than this part of its sigma.
 const SETTLED: f64 = 0.02;
+/// The same where gates or weights change afterwards anyway.
+const COARSE: f64 = 1.0;
 /// Gates of the search for surfaces, from the first poses to good ones.
-const GATES: [Gate; 4] = [
+const GATES: [Gate; 3] = [
     Gate {
         near_m: 0.25,
         turn_rad: 0.02,
     },
     Gate {
-        near_m: 0.15,
-        turn_rad: 0.005,
-    },
-    Gate {
-        near_m: 0.08,
-        turn_rad: 0.001,
+        near_m: 0.1,
+        turn_rad: 0.002,
     },
     Gate {
         near_m: 0.06,
@@ -66,6 +65,10 @@ const SMOOTH_M: f64 = 5e-4;
 const LEARNING_ROUNDS: usize = 2;
 /// It is not taken for less than this, metres.
 const LEAST_OFFSET_U_M: f64 = 2e-3;
+/// Prior sigma of a unit's error of range to retroreflectors, metres.
+const RETRO_U_M: f64 = 0.02;
+/// A turn less sure than this is held by no observation, radians.
+const LOOSE_TURN_RAD: f64 = 0.01;
 /// Holds nothing but an unknown that nothing else holds: radians, and metres.
 const LOOSE_RAD: f64 = 1.0;
 const LOOSE_M: f64 = 100.0;
@@ -122,6 +125,8 @@ pub struct Adjusted {
     pub residuals: Vec<[f64; 2]>,
     /// What became of everything known, in the order given.
     pub judged: Vec<Vec<Judged>>,
+    /// Spheres as lidars saw them.
+    pub seen: Vec<Seen>,
     /// Where those rays ended, world frame, metres.
     points_m: Vec<Vector3<f64>>,
     /// Scatter of the channels' offsets as found, metres.
@@ -130,6 +135,19 @@ pub struct Adjusted {
     pub steps: usize,
     /// Whether it settled.
     pub converged: bool,
+}
+
+/// A sphere as one lidar saw it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Which lidar.
+    pub lidar: usize,
+    /// Which target.
+    pub target: usize,
+    /// Echoes that agree.
+    pub count: usize,
+    /// Root mean square of their residuals, metres.
+    pub rms_m: f64,
 }
 
 impl Adjusted {
@@ -189,19 +207,19 @@ pub fn adjust(network: &Network, stop: &AtomicBool) -> Result<Adjusted, NetworkE
     let mut work = Work::new(network, stop);
     for gate in &GATES {
         work.select(gate)?;
-        work.settle(Doubt::All)?;
+        work.settle(Doubt::All, COARSE)?;
     }
     work.roughen();
     for _ in 0..LEARNING_ROUNDS {
-        let solved = work.settle(Doubt::All)?;
+        let solved = work.settle(Doubt::All, COARSE)?;
         work.learn_offsets(&solved);
         work.roughen();
     }
     work.select(&GATES[GATES.len() - 1])?;
-    let mut solved = work.settle(Doubt::Rays)?;
+    let mut solved = work.settle(Doubt::Rays, SETTLED)?;
     while let Some(worst) = work.worst(&solved) {
         work.left_out[worst] = true;
-        solved = work.settle(Doubt::Rays)?;
+        solved = work.settle(Doubt::Rays, SETTLED)?;
     }
     Ok(work.finish(solved))
 }
@@ -219,7 +237,10 @@ struct Work<'a> {
     state: State,
     layout: Layout,
     met: Vec<Met>,
-    alike: Vec<f64>,
+    places: Vec<Place>,
+    spheres: Vec<OnSphere>,
+    spheres_alike: Vec<f64>,
+    slack_m: f64,
     left_out: Vec<bool>,
     offset_u_m: f64,
     steps: usize,
@@ -234,7 +255,10 @@ impl<'a> Work<'a> {
             state: network.start.clone(),
             layout: network.start.layout(),
             met: Vec::new(),
-            alike: Vec::new(),
+            places: Vec::new(),
+            spheres: Vec::new(),
+            spheres_alike: Vec::new(),
+            slack_m: 0.0,
             left_out: vec![false; network.known.len()],
             offset_u_m: network.priors.channel_offset_u_m,
             steps: 0,
@@ -247,19 +271,42 @@ impl<'a> Work<'a> {
         self.met = holds
             .flat_map(|(lidar, hold)| select::met(&self.state, hold, lidar, gate))
             .collect();
-        if self.met.is_empty() {
+        self.select_spheres(gate);
+        if self.met.is_empty() && self.spheres.is_empty() {
             return Err(NetworkError::NothingMet {
                 rays: self.network.holds.iter().map(|h| h.beams.len()).sum(),
                 surfaces: self.state.surfaces.len(),
             });
         }
-        self.alike = self.alike();
+        self.places = self.places();
         Ok(())
     }
 
-    /// How many rays of its lidar each ray shares its place with: what the surface hides there is the
-    /// same for all of them and does not average out.
-    fn alike(&self) -> Vec<f64> {
+    /// Bright echoes of spheres: the wider the gate, the less each of them is believed.
+    fn select_spheres(&mut self, gate: &Gate) {
+        let near_m = |range_m: f64| gate.near_m + gate.turn_rad * range_m;
+        let holds = self.network.holds.iter().enumerate();
+        self.spheres = holds
+            .flat_map(|(lidar, hold)| target::met(&self.state, hold, lidar, near_m))
+            .collect();
+        let mut counts = BTreeMap::new();
+        for met in &self.spheres {
+            *counts.entry((met.lidar, met.target)).or_insert(0.0) += 1.0;
+        }
+        let alike = |met: &OnSphere| counts[&(met.lidar, met.target)];
+        self.spheres_alike = self.spheres.iter().map(alike).collect();
+        let is_last = gate.near_m <= GATES[GATES.len() - 1].near_m;
+        self.slack_m = if is_last { 0.0 } else { gate.near_m };
+    }
+
+    fn sphere(&self, met: &OnSphere, alike: f64) -> Option<Row> {
+        let echo = &self.network.holds[met.lidar].bright[met.echo];
+        rows::on_sphere(&self.state, &self.layout, met, echo, self.slack_m, alike)
+    }
+
+    /// Where each ray ended, and how many rays of its lidar share that: what the surface hides there is
+    /// the same for all of them and does not average out.
+    fn places(&self) -> Vec<Place> {
         let place = |met: &Met| {
             let beam = &self.network.holds[met.lidar].beams[met.beam];
             let point = select::world(&self.state.lidars[met.lidar], beam);
@@ -267,32 +314,38 @@ impl<'a> Work<'a> {
             let side_m = surface.field.as_ref().map_or(ALIKE_M, Field::spacing_m);
             let [u, v, _] = surface.frame.local(&point);
             let cell = |t: f64| (t / side_m).floor() as i64;
-            (met.lidar, met.surface, cell(u), cell(v))
+            let around = surface.around(&point);
+            ((met.lidar, met.surface, cell(u), cell(v)), around)
         };
         let places: Vec<_> = self.met.iter().map(place).collect();
-        let mut counts = BTreeMap::new();
-        for place in &places {
-            *counts.entry(*place).or_insert(0.0) += 1.0;
+        let mut counts = HashMap::new();
+        for (cell, _) in &places {
+            *counts.entry(*cell).or_insert(0.0) += 1.0;
         }
-        places.iter().map(|place| counts[place]).collect()
+        let places = places.into_iter().map(|(cell, around)| Place {
+            surface: cell.1,
+            around,
+            alike: counts[&cell],
+        });
+        places.collect()
     }
 
-    /// Gauss-Newton until nothing moves.
-    fn settle(&mut self, doubt: Doubt) -> Result<Solved, NetworkError> {
+    /// Gauss-Newton until no pose moves by more than this part of its sigma.
+    fn settle(&mut self, doubt: Doubt, settled: f64) -> Result<Solved, NetworkError> {
         self.converged = false;
-        let mut solved = self.solve(doubt)?;
-        for step in 1..=STEPS {
+        let mut step = 1;
+        loop {
+            let solved = self.solve(doubt)?;
             self.state
                 .advance(&self.layout, &solved.border, &solved.nodes);
             self.steps = step;
             let moved = self.moved(&solved);
-            solved = self.solve(doubt)?;
-            if moved < SETTLED {
-                self.converged = true;
-                break;
+            self.converged = moved < settled;
+            if self.converged || step == STEPS {
+                return Ok(solved);
             }
+            step += 1;
         }
-        Ok(solved)
     }
 
     /// Largest step of a pose over its sigma.
@@ -312,8 +365,13 @@ impl<'a> Work<'a> {
             return Err(NetworkError::Stopped);
         }
         let mut normal = Normal::new(&self.state, &self.layout);
-        for (met, alike) in self.met.iter().zip(&self.alike) {
-            if let Some(row) = self.ray(met, *alike) {
+        for (met, place) in self.met.iter().zip(&self.places) {
+            if let Some(row) = self.ray(met, place) {
+                normal.add(&row, share(&row));
+            }
+        }
+        for (met, alike) in self.spheres.iter().zip(&self.spheres_alike) {
+            if let Some(row) = self.sphere(met, *alike) {
                 normal.add(&row, share(&row));
             }
         }
@@ -328,21 +386,25 @@ impl<'a> Work<'a> {
             }
         }
         self.hold_priors(&mut normal);
-        normal.solve().ok_or(NetworkError::Singular {
+        normal.solve(&self.frozen()).ok_or(NetworkError::Singular {
             unknowns: self.layout.border + self.layout.nodes,
         })
     }
 
-    fn ray(&self, met: &Met, alike: f64) -> Option<Row> {
+    /// Turns that do not move once rays keep the places where they ended, unless they are this sure: what
+    /// nothing but a mounting holds would carry the rays over the roughness and back.
+    fn frozen(&self) -> Vec<(usize, f64)> {
+        let turns =
+            |at: &usize| (*at + Term::ROTATION..*at + Term::POSITION).map(|k| (k, LOOSE_TURN_RAD));
+        match self.layout.nodes {
+            0 => Vec::new(),
+            _ => self.layout.lidars.iter().flat_map(turns).collect(),
+        }
+    }
+
+    fn ray(&self, met: &Met, place: &Place) -> Option<Row> {
         let beam = &self.network.holds[met.lidar].beams[met.beam];
-        rows::ray(
-            &self.state,
-            &self.layout,
-            met.lidar,
-            beam,
-            met.surface,
-            alike,
-        )
+        rows::ray(&self.state, &self.layout, met.lidar, beam, place)
     }
 
     fn hold_priors(&self, normal: &mut Normal) {
@@ -364,6 +426,9 @@ impl<'a> Work<'a> {
         }
         let targets = self.layout.targets.iter().flat_map(|at| *at..at + 3);
         targets.for_each(|k| normal.hold(k, 0.0, LOOSE_M));
+        for (lidar, at) in self.state.lidars.iter().zip(&self.layout.retro) {
+            normal.hold(*at, lidar.retro_m, RETRO_U_M);
+        }
     }
 
     /// Takes the scatter of the channels about their lidar's mean from what was found: squares of the
@@ -416,7 +481,7 @@ impl<'a> Work<'a> {
             self.state.surfaces[surface].field = Some(Field::new(roughness, &places));
         }
         self.layout = self.state.layout();
-        self.alike = self.alike();
+        self.places = self.places();
     }
 
     /// Residual heights of the rays on a surface.
@@ -425,10 +490,10 @@ impl<'a> Work<'a> {
             field: None, // whatever is not smooth is what is looked for
             ..self.state.surfaces[surface].clone()
         };
-        let all = self.met.iter().zip(&self.alike);
+        let all = self.met.iter().zip(&self.places);
         let on = all.filter(|(met, _)| met.surface == surface);
-        on.filter_map(|(met, alike)| {
-            self.ray(met, *alike).filter(|row| share(row) > 0.0)?;
+        on.filter_map(|(met, place)| {
+            self.ray(met, place).filter(|row| share(row) > 0.0)?;
             let beam = &self.network.holds[met.lidar].beams[met.beam];
             let lidar = &self.state.lidars[met.lidar];
             let point = select::world(lidar, beam);
@@ -466,9 +531,27 @@ impl<'a> Work<'a> {
             .collect()
     }
 
+    fn seen(&self) -> Vec<Seen> {
+        let mut sums: BTreeMap<(usize, usize), (usize, f64)> = BTreeMap::new();
+        for (met, alike) in self.spheres.iter().zip(&self.spheres_alike) {
+            let row = self.sphere(met, *alike);
+            if let Some(row) = row.filter(|row| share(row) > 0.0) {
+                let sum = sums.entry((met.lidar, met.target)).or_default();
+                *sum = (sum.0 + 1, sum.1 + row.residual.powi(2));
+            }
+        }
+        let seen = |((lidar, target), (count, squares)): (_, (usize, f64))| Seen {
+            lidar,
+            target,
+            count,
+            rms_m: (squares / count as f64).sqrt(),
+        };
+        sums.into_iter().map(seen).collect()
+    }
+
     fn finish(self, solved: Solved) -> Adjusted {
-        let rays = self.met.iter().zip(&self.alike);
-        let residuals = rays.map(|(met, alike)| match self.ray(met, *alike) {
+        let rays = self.met.iter().zip(&self.places);
+        let residuals = rays.map(|(met, place)| match self.ray(met, place) {
             Some(row) if share(&row) > 0.0 => [row.residual, row.sigma],
             _ => [f64::NAN; 2],
         });
@@ -477,6 +560,7 @@ impl<'a> Work<'a> {
             select::world(&self.state.lidars[met.lidar], beam)
         });
         Adjusted {
+            seen: self.seen(),
             points_m: points.collect(),
             residuals: residuals.collect(),
             judged: (0..self.network.known.len())

@@ -119,8 +119,9 @@ impl Normal {
         }
     }
 
-    /// Solves; None where the matrix is not positive definite.
-    pub fn solve(self) -> Option<Solved> {
+    /// Solves; None where the matrix is not positive definite. Of the unknowns `frozen`, those less sure
+    /// than their limit do not move, and all others move as fits that; the covariance is that of all.
+    pub fn solve(self, frozen: &[(usize, f64)]) -> Option<Solved> {
         let width = self.border.ncols();
         let factor = self.field.factor()?;
         let (mut coupling, mut right) = (self.coupling, self.field_right);
@@ -136,7 +137,7 @@ impl Normal {
                 .for_each(|(r, c)| *r -= c * value);
         }
         let covariance = inverse(&border)?;
-        let step = &covariance * border_right;
+        let step = held(&covariance, &covariance * border_right, frozen);
         for (row, value) in coupling.chunks_exact(width).zip(&mut right) {
             *value -= row.iter().zip(step.iter()).map(|(c, s)| c * s).sum::<f64>();
         }
@@ -149,6 +150,20 @@ impl Normal {
             nodes: right,
         })
     }
+}
+
+/// A step given that some unknowns do not move: those less sure than their limit.
+fn held(covariance: &DMatrix<f64>, step: DVector<f64>, frozen: &[(usize, f64)]) -> DVector<f64> {
+    let loose = frozen
+        .iter()
+        .filter(|(k, limit)| covariance[(*k, *k)] > limit * limit);
+    let loose: Vec<usize> = loose.map(|(k, _)| *k).collect();
+    let own = covariance.select_rows(&loose).select_columns(&loose);
+    let Some(inverse) = own.cholesky().filter(|_| !loose.is_empty()) else {
+        return step;
+    };
+    let moved = DVector::from_iterator(loose.len(), loose.iter().map(|k| step[*k]));
+    step - covariance.select_columns(&loose) * inverse.solve(&moved)
 }
 
 fn subtract_square(matrix: &mut DMatrix<f64>, row: &[f64]) {
@@ -207,4 +222,20 @@ fn envelope(fields: &[Option<&Field>], layout: &Layout) -> Vec<usize> {
         }
     }
     first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_frozen_stays_and_the_rest_follows() {
+        // Two unknowns of correlation 0.8: held at zero, the first takes its share from the second.
+        let covariance = DMatrix::from_row_slice(2, 2, &[4.0, 0.8, 0.8, 0.25]);
+        let step = DVector::from_vec(vec![1.0, 0.5]);
+        let found = held(&covariance, step.clone(), &[(0, 1.0), (1, 1.0)]);
+        assert!(found[0].abs() < 1e-12);
+        assert!((found[1] - (0.5 - 0.8 / 4.0)).abs() < 1e-12);
+        assert_eq!(held(&covariance, step.clone(), &[(0, 3.0)]), step);
+    }
 }

@@ -6,9 +6,11 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
+use super::field::Around;
 use super::hold::Beam;
-use super::state::{Layout, State, Term};
+use super::state::{Layout, LidarState, State, Term};
 use super::surface::Height;
+use super::target::OnSphere;
 
 /// How steady the direction of a mean ray is, radians: stamps of the azimuth, eccentricity of the encoder.
 pub const DIRECTION_U_RAD: f64 = 1e-4;
@@ -31,6 +33,25 @@ impl Row {
         let entries = values.iter().enumerate();
         self.border
             .extend(entries.map(|(k, value)| (start + k, *value)));
+    }
+
+    /// Derivatives by a lidar's pose and what is wrong with it, of a ray that ends at `arm` from its
+    /// origin on something whose gradient over closing is `slope`.
+    fn ray(
+        &mut self,
+        start: usize,
+        beam: &Beam,
+        slope: &Vector3<f64>,
+        arm: &Vector3<f64>,
+        lifted: &Vector3<f64>,
+    ) {
+        self.vector(start + Term::ROTATION, &arm.cross(slope));
+        self.vector(start + Term::POSITION, slope);
+        self.border
+            .push((start + Term::ELEVATION, slope.dot(lifted)));
+        self.border.push((start + Term::SCALE, beam.range_m));
+        self.border
+            .push((start + Term::OFFSETS + usize::from(beam.ring), 1.0));
     }
 
     /// Derivatives by the shape of a surface, times `factor`.
@@ -63,28 +84,52 @@ pub fn raised(direction: &Unit<Vector3<f64>>, elevation_rad: f64) -> (Vector3<f6
     (turned, up * cosine - direction.into_inner() * sine)
 }
 
-/// A mean ray that met a surface; None where the model's ray meets it nowhere. So many rays as `alike`
-/// share what the surface hides around the place.
+/// A ray as the state has it: range, direction in the world, its derivative by the elevation offset.
+struct Aimed {
+    range_m: f64,
+    direction: Vector3<f64>,
+    by_elevation: Vector3<f64>,
+}
+
+fn aimed(of: &LidarState, beam: &Beam) -> Aimed {
+    let offset = of.offsets_m.get(usize::from(beam.ring)).copied();
+    let (direction, by_elevation) = raised(&beam.direction, of.elevation_rad);
+    Aimed {
+        range_m: beam.range_m * (1.0 + of.scale) + offset.unwrap_or(0.0),
+        direction: of.rotation * direction,
+        by_elevation: of.rotation * by_elevation,
+    }
+}
+
+/// The place on a surface where a ray ended.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    /// Which surface.
+    pub surface: usize,
+    /// Nodes of its roughness around the place.
+    pub around: Option<Around>,
+    /// So many rays of the same lidar share what the surface hides there.
+    pub alike: f64,
+}
+
+/// A mean ray that met a surface; None where the model's ray meets it nowhere.
 pub fn ray(
     state: &State,
     layout: &Layout,
     lidar: usize,
     beam: &Beam,
-    surface: usize,
-    alike: f64,
+    place: &Place,
 ) -> Option<Row> {
+    let surface = place.surface;
     let (of, shape) = (&state.lidars[lidar], &state.surfaces[surface]);
-    let offset = of
-        .offsets_m
-        .get(usize::from(beam.ring))
-        .copied()
-        .unwrap_or(0.0);
-    let range_m = beam.range_m * (1.0 + of.scale) + offset;
-    let (direction, by_elevation) = raised(&beam.direction, of.elevation_rad);
-    let direction = of.rotation * direction;
-    let (meets_m, gradient, height) = shape.meet(&of.position_m, &direction, range_m)?;
+    let Aimed {
+        range_m,
+        direction,
+        by_elevation,
+    } = aimed(of, beam);
+    let (meets_m, gradient, height) =
+        shape.meet(&of.position_m, &direction, range_m, place.around)?;
     let closing = gradient.dot(&direction);
-    let start = layout.lidars[lidar];
     let mut row = Row {
         residual: range_m - meets_m,
         sigma: ray_sigma(
@@ -94,19 +139,19 @@ pub fn ray(
             meets_m,
             closing.abs() / gradient.norm(),
             &height,
-            alike,
+            place.alike,
         ),
         ..Row::default()
     };
     let arm = direction * meets_m; // to the model's intersection
-    row.vector(start + Term::ROTATION, &(arm.cross(&gradient) / closing));
-    row.vector(start + Term::POSITION, &(gradient / closing));
-    let lifted = of.rotation * by_elevation * meets_m;
-    row.border
-        .push((start + Term::ELEVATION, gradient.dot(&lifted) / closing));
-    row.border.push((start + Term::SCALE, beam.range_m));
-    row.border
-        .push((start + Term::OFFSETS + usize::from(beam.ring), 1.0));
+    let lifted = by_elevation * meets_m;
+    row.ray(
+        layout.lidars[lidar],
+        beam,
+        &(gradient / closing),
+        &arm,
+        &lifted,
+    );
     row.shape(layout, surface, &height, -1.0 / closing);
     Some(row)
 }
@@ -125,6 +170,49 @@ fn ray_sigma(
     let aimed = range_m * DIRECTION_U_RAD * tangent;
     let rough = state.unseen_m(surface, height) / cosine;
     (beam.sigma_m.powi(2) + aimed.powi(2) + alike * rough.powi(2)).sqrt()
+}
+
+/// Rays that pass a sphere's middle by more than this share of its radius meet it nowhere in particular.
+const RIM: f64 = 0.98;
+/// How round and how steady a sphere is: alike for all rays of one lidar on it, metres.
+const ROUND_U_M: f64 = 1e-3;
+
+/// A bright echo of a sphere, of which its lidar has `alike`; None where the model's ray misses it
+/// or the target is no sphere. `slack_m` is what the poses may still be off.
+pub fn on_sphere(
+    state: &State,
+    layout: &Layout,
+    met: &OnSphere,
+    beam: &Beam,
+    slack_m: f64,
+    alike: f64,
+) -> Option<Row> {
+    let (of, target) = (&state.lidars[met.lidar], &state.targets[met.target]);
+    let radius_m = target.radius_m?;
+    let ray = aimed(of, beam);
+    let from = target.centre_m - of.position_m;
+    let ahead_m = from.dot(&ray.direction);
+    let aside_m = (from - ray.direction * ahead_m).norm();
+    if aside_m > RIM * radius_m {
+        return None;
+    }
+    let meets_m = ahead_m - (radius_m.powi(2) - aside_m.powi(2)).sqrt();
+    let arm = ray.direction * meets_m;
+    let normal = (arm - from) / radius_m;
+    let closing = normal.dot(&ray.direction);
+    let aim_m = DIRECTION_U_RAD * meets_m * (1.0 - closing * closing).max(0.0).sqrt() / closing;
+    let variance = beam.sigma_m.powi(2) + aim_m.powi(2) + slack_m.powi(2);
+    let mut row = Row {
+        residual: ray.range_m + of.retro_m - meets_m,
+        sigma: (variance + alike * ROUND_U_M.powi(2)).sqrt(),
+        ..Row::default()
+    };
+    let slope = normal / closing;
+    let lifted = ray.by_elevation * meets_m;
+    row.ray(layout.lidars[met.lidar], beam, &slope, &arm, &lifted);
+    row.vector(layout.targets[met.target], &-slope);
+    row.border.push((layout.retro[met.lidar], 1.0));
+    Some(row)
 }
 
 /// A surveyed point on a surface.
@@ -248,7 +336,7 @@ pub fn target(
     xyz_m: &Vector3<f64>,
     u_m: f64,
 ) -> [Row; 3] {
-    let residual = xyz_m - state.targets[target];
+    let residual = xyz_m - state.targets[target].centre_m;
     [0, 1, 2].map(|k| Row {
         residual: residual[k],
         sigma: u_m,
@@ -266,8 +354,8 @@ pub struct Sight {
     pub target: usize,
     /// Its centre, sensor frame, metres.
     pub centre_m: Vector3<f64>,
-    /// Standard deviation across the ray, metres.
-    pub across_u_m: f64,
+    /// Standard deviations across the ray, in the plane of rotation and out of it, metres.
+    pub across_u_m: [f64; 2],
     /// Standard deviation along the ray, metres; large where a reflector falsifies the range.
     pub along_u_m: f64,
 }
@@ -277,21 +365,19 @@ pub fn sight(state: &State, layout: &Layout, sight: &Sight) -> [Row; 3] {
     let of = &state.lidars[sight.lidar];
     let direction = Unit::new_normalize(sight.centre_m);
     let frame = axes_around(&direction);
-    let seen = of.rotation.inverse() * (state.targets[sight.target] - of.position_m);
+    // frame . R^T (T - t): a turn w of R moves it by -w . ((T - t) x axis).
+    let from = state.targets[sight.target].centre_m - of.position_m;
+    let seen = of.rotation.inverse() * from;
+    let [level_u_m, upright_u_m] = sight.across_u_m;
+    let sigmas = [level_u_m, upright_u_m, sight.along_u_m];
     let start = layout.lidars[sight.lidar];
     [0, 1, 2].map(|k| {
         let axis = of.rotation * frame[k];
         let mut row = Row {
             residual: frame[k].dot(&(sight.centre_m - seen)),
-            sigma: if k == 2 {
-                sight.along_u_m
-            } else {
-                sight.across_u_m
-            },
+            sigma: sigmas[k],
             ..Row::default()
         };
-        // frame . R^T (T - t): a turn w of R moves it by -w . ((T - t) x axis).
-        let from = state.targets[sight.target] - of.position_m;
         row.vector(start + Term::ROTATION, &-axis.cross(&from));
         row.vector(start + Term::POSITION, &axis);
         row.vector(layout.targets[sight.target], &-axis);
@@ -299,9 +385,9 @@ pub fn sight(state: &State, layout: &Layout, sight: &Sight) -> [Row; 3] {
     })
 }
 
+/// Level in the plane of rotation, upright, along a direction of the sensor.
 fn axes_around(direction: &Unit<Vector3<f64>>) -> [Vector3<f64>; 3] {
-    let mut helper = Vector3::zeros();
-    helper[direction.iamin()] = 1.0;
-    let first = direction.cross(&helper).normalize();
-    [first, direction.cross(&first), direction.into_inner()]
+    let turning = Vector3::z().cross(direction);
+    let level = turning.try_normalize(1e-9).unwrap_or_else(Vector3::x);
+    [level, direction.cross(&level), direction.into_inner()]
 }

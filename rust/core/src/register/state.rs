@@ -3,12 +3,10 @@
 use nalgebra::{Rotation3, Vector3};
 
 use super::surface::{COEFFICIENTS, Height, Surface};
+use super::target::Target;
 
 /// Roughness of a surface before anything is known of it, metres.
 pub const UNKNOWN_ROUGHNESS_M: f64 = 0.02;
-
-/// Share of the roughness that a blend between nodes does not follow.
-const BETWEEN_NODES: f64 = 0.3;
 
 /// One lidar as it is taken to stand.
 #[derive(Debug, Clone)]
@@ -23,6 +21,8 @@ pub struct LidarState {
     pub scale: f64,
     /// By ring, metres: measured + offset = true.
     pub offsets_m: Vec<f64>,
+    /// The same of echoes of retroreflectors on top, metres.
+    pub retro_m: f64,
 }
 
 /// Everything that is estimated.
@@ -32,8 +32,8 @@ pub struct State {
     pub lidars: Vec<LidarState>,
     /// Surfaces.
     pub surfaces: Vec<Surface>,
-    /// Targets, world frame, metres.
-    pub targets: Vec<Vector3<f64>>,
+    /// Targets.
+    pub targets: Vec<Target>,
 }
 
 /// Places of the unknowns of one lidar, from its first.
@@ -61,6 +61,8 @@ pub struct Layout {
     pub surfaces: Vec<usize>,
     /// By target.
     pub targets: Vec<usize>,
+    /// Error of range to retroreflectors, by lidar; empty without targets.
+    pub retro: Vec<usize>,
     /// Number of unknowns of the border.
     pub border: usize,
     /// First node by surface.
@@ -85,6 +87,8 @@ impl State {
         layout.lidars = lidars.map(&mut next).collect();
         layout.surfaces = self.surfaces.iter().map(|_| next(COEFFICIENTS)).collect();
         layout.targets = self.targets.iter().map(|_| next(3)).collect();
+        let bright = self.lidars.iter().filter(|_| !self.targets.is_empty());
+        layout.retro = bright.map(|_| next(1)).collect();
         for surface in &self.surfaces {
             layout.fields.push(layout.nodes);
             layout.nodes += surface.field.as_ref().map_or(0, super::field::Field::len);
@@ -99,7 +103,7 @@ impl State {
         };
         let roughness = field.roughness();
         match height.around {
-            Some(_) => roughness.nugget_m.hypot(BETWEEN_NODES * roughness.sigma_m),
+            Some(_) => roughness.nugget_m.hypot(field.between_m()),
             None => roughness.nugget_m.hypot(roughness.sigma_m),
         }
     }
@@ -136,7 +140,10 @@ impl State {
             }
         }
         for (target, at) in self.targets.iter_mut().zip(&layout.targets) {
-            *target += vector(*at);
+            target.centre_m += vector(*at);
+        }
+        for (lidar, at) in self.lidars.iter_mut().zip(&layout.retro) {
+            lidar.retro_m += border[*at];
         }
     }
 }

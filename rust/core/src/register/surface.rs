@@ -84,8 +84,14 @@ impl Surface {
         }
     }
 
-    /// Its height above the place (u, v).
-    pub fn height(&self, u: f64, v: f64) -> Height {
+    /// Nodes of the roughness around a point of the world, None where there are none.
+    pub fn around(&self, point_m: &Vector3<f64>) -> Option<Around> {
+        let [u, v, _] = self.frame.local(point_m);
+        self.field.as_ref()?.around(&[u, v])
+    }
+
+    /// Its height above the place (u, v), of whose roughness the nodes `around` tell.
+    pub fn height(&self, u: f64, v: f64, around: Option<Around>) -> Height {
         let [a, b] = self.frame.half_m;
         let (x, y) = (u / a, v / b);
         let basis = [1.0, x, y, x * x, x * y, y * y];
@@ -102,14 +108,11 @@ impl Surface {
             height_m: sum(&basis),
             slope: [sum(&by_u), sum(&by_v)],
             basis,
-            around: None,
+            around,
         };
-        if let Some(field) = &self.field {
-            height.around = field.around(&[u, v]);
-            if let Some(around) = &height.around {
-                let nodes = around.nodes.iter().zip(around.weights);
-                height.height_m += nodes.map(|(k, w)| w * field.heights_m[*k]).sum::<f64>();
-            }
+        if let (Some(field), Some(around)) = (&self.field, &height.around) {
+            let nodes = around.nodes.iter().zip(around.weights);
+            height.height_m += nodes.map(|(k, w)| w * field.heights_m[*k]).sum::<f64>();
         }
         height
     }
@@ -120,8 +123,16 @@ impl Surface {
     /// The gradient is that of the smooth part: the slopes of the roughness are as uncertain as they
     /// are steep, and a derivative that follows them takes noise for leverage.
     pub fn above(&self, point_m: &Vector3<f64>) -> (f64, Vector3<f64>, Height) {
+        self.above_nodes(point_m, self.around(point_m))
+    }
+
+    fn above_nodes(
+        &self,
+        point_m: &Vector3<f64>,
+        around: Option<Around>,
+    ) -> (f64, Vector3<f64>, Height) {
         let [u, v, h] = self.frame.local(point_m);
-        let height = self.height(u, v);
+        let height = self.height(u, v, around);
         let gradient = self.frame.normal.into_inner()
             - self.frame.along.into_inner() * height.slope[0]
             - self.frame.across() * height.slope[1];
@@ -130,16 +141,22 @@ impl Surface {
 
     /// Range at which a ray meets the surface, metres, with the gradient and height there.
     ///
+    /// The roughness is that of the nodes `around` the place where the ray ended. A ray that follows it
+    /// from place to place wanders where it is flatter than the roughness is steep, and ends somewhere
+    /// else with every step of the adjustment.
+    ///
     /// None where the ray runs along the surface or the search does not settle.
     pub fn meet(
         &self,
         origin_m: &Vector3<f64>,
         direction: &Vector3<f64>,
         near_m: f64,
+        around: Option<Around>,
     ) -> Option<(f64, Vector3<f64>, Height)> {
         let mut range_m = near_m;
         for _ in 0..MEET_STEPS {
-            let (above, gradient, height) = self.above(&(origin_m + direction * range_m));
+            let (above, gradient, height) =
+                self.above_nodes(&(origin_m + direction * range_m), around);
             let closing = gradient.dot(direction);
             if closing.abs() < LEAST_COSINE {
                 return None;
@@ -154,8 +171,8 @@ impl Surface {
     }
 }
 
-/// Roughness as steep as the ray makes the search wander; such a ray is left out.
-const MEET_STEPS: usize = 25;
+/// The bend of a surface needs two or three.
+const MEET_STEPS: usize = 10;
 const MEET_TOLERANCE_M: f64 = 1e-6;
 /// Rays flatter than this against the surface meet it nowhere in particular.
 const LEAST_COSINE: f64 = 0.01;
@@ -190,11 +207,11 @@ mod tests {
         let surface = bent();
         let origin = Vector3::new(3.0, -6.8, 86.0);
         let direction = Vector3::new(-0.7, -0.2, 0.3).normalize();
-        let (range_m, ..) = surface.meet(&origin, &direction, 5.0).unwrap();
+        let (range_m, ..) = surface.meet(&origin, &direction, 5.0, None).unwrap();
         let (above, ..) = surface.above(&(origin + direction * range_m));
         assert!(above.abs() < 1e-9);
         let along = Vector3::new(-1.0, -0.0201, 0.0).normalize();
-        assert!(surface.meet(&origin, &along, 5.0).is_none());
+        assert!(surface.meet(&origin, &along, 5.0, None).is_none());
     }
 
     #[test]

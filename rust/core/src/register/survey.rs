@@ -114,7 +114,12 @@ impl Known {
             }
             Self::Distance { between, u_m, .. } => (between[0].max(between[1]), 0, 0, *u_m),
             Self::Target { target, u_m, .. } => (0, 0, *target, *u_m),
-            Self::Sight(s) => (s.lidar, 0, s.target, s.across_u_m.min(s.along_u_m)),
+            Self::Sight(s) => (
+                s.lidar,
+                0,
+                s.target,
+                s.across_u_m[0].min(s.across_u_m[1]).min(s.along_u_m),
+            ),
         };
         let speaks_of = |index: usize, count: usize| index == 0 || index < count;
         let there =
@@ -134,6 +139,8 @@ mod tests {
     use super::super::hold::Beam;
     use super::super::state::LidarState;
     use super::super::surface::{Surface, SurfaceFrame};
+    use super::super::target::{OnSphere, Target};
+    use super::rows::Place;
     use super::*;
 
     /// Two lidars turned anyhow over a rough bent ground, and a target.
@@ -144,6 +151,7 @@ mod tests {
             elevation_rad: 0.001,
             scale: 2e-4,
             offsets_m: vec![0.01, -0.02],
+            retro_m: 0.004,
         };
         let normal = Unit::new_normalize(Vector3::new(-0.02, 1.0, 0.0123));
         let frame = SurfaceFrame::new(Vector3::new(0.0, -8.0, 95.0), normal, [20.0, 15.0]);
@@ -167,7 +175,10 @@ mod tests {
                 lidar(94.0, Vector3::new(-0.06, 0.02, 0.01)),
             ],
             surfaces: vec![surface],
-            targets: vec![Vector3::new(4.0, -6.0, 90.0)],
+            targets: vec![Target {
+                centre_m: Vector3::new(4.0, -6.0, 90.0),
+                radius_m: Some(0.2),
+            }],
         }
     }
 
@@ -182,13 +193,24 @@ mod tests {
         }
     }
 
+    /// Where the ray of `beam` ends on the ground.
+    fn place() -> Place {
+        let state = state();
+        let end = super::super::select::world(&state.lidars[0], &beam());
+        Place {
+            surface: 0,
+            around: state.surfaces[0].around(&end),
+            alike: 1.0,
+        }
+    }
+
     fn everything() -> Vec<Known> {
         let up = Vector3::new(0.02, -1.0, 0.05);
         let sight = Sight {
             lidar: 1,
             target: 0,
             centre_m: Vector3::new(1.0, 0.7, -4.0),
-            across_u_m: 0.001,
+            across_u_m: [0.001, 0.02],
             along_u_m: 0.02,
         };
         vec![
@@ -234,7 +256,7 @@ mod tests {
         let rows = rows_at(&state, &layout);
         assert!(!rows.is_empty());
         let step = 1e-6;
-        let moved = |border: usize, nodes: usize| {
+        let moved = |border: usize, nodes: usize, step: f64| {
             let mut steps = (vec![0.0; layout.border], vec![0.0; layout.nodes]);
             if border < layout.border {
                 steps.0[border] = step;
@@ -248,21 +270,24 @@ mod tests {
         let near =
             |found: f64, numeric: f64| (found - numeric).abs() < 2e-5 * (1.0 + numeric.abs());
         for unknown in 0..layout.border {
-            for (row, after) in rows.iter().zip(moved(unknown, 0)) {
+            let sides = moved(unknown, 0, -step)
+                .into_iter()
+                .zip(moved(unknown, 0, step));
+            for (row, (before, after)) in rows.iter().zip(sides) {
                 let found: f64 = row
                     .border
                     .iter()
                     .filter(|(i, _)| *i == unknown)
                     .map(|e| e.1)
                     .sum();
-                let numeric = (after.residual - row.residual) / step;
+                let numeric = (after.residual - before.residual) / (2.0 * step);
                 assert!(near(found, numeric), "unknown {unknown}: {found} {numeric}");
             }
         }
         for (row, k) in rows.iter().zip(0..) {
             for (node, found) in &row.field {
-                let after = &moved(layout.border, *node)[k];
-                let numeric = (after.residual - row.residual) / step;
+                let side = |step| moved(layout.border, *node, step)[k].residual;
+                let numeric = (side(step) - side(-step)) / (2.0 * step);
                 assert!(near(*found, numeric), "node {node}: {found} {numeric}");
             }
         }
@@ -274,20 +299,49 @@ mod tests {
             check(&|state, layout| known.rows(state, layout));
         }
         check(&|state, layout| {
-            rows::ray(state, layout, 0, &beam(), 0, 1.0)
+            rows::ray(state, layout, 0, &beam(), &place())
                 .into_iter()
                 .collect()
         });
     }
 
     #[test]
+    fn so_are_those_of_a_ray_on_a_sphere() {
+        let (on, echo) = (
+            OnSphere {
+                lidar: 0,
+                echo: 0,
+                target: 0,
+            },
+            sphere_echo(),
+        );
+        check(&|state, layout| {
+            rows::on_sphere(state, layout, &on, &echo, 0.0, 1.0)
+                .into_iter()
+                .collect()
+        });
+    }
+
+    /// An echo of lidar 0 that passes the middle of the target by a third of its radius.
+    fn sphere_echo() -> Beam {
+        let state = state();
+        let of = &state.lidars[0];
+        let aim = state.targets[0].centre_m + Vector3::new(0.04, 0.05, 0.0) - of.position_m;
+        Beam {
+            direction: Unit::new_normalize(of.rotation.inverse() * aim),
+            range_m: aim.norm() - 0.19,
+            ..beam()
+        }
+    }
+
+    #[test]
     fn a_residual_on_the_ray_does_not_reach_the_derivative() {
         let state = state();
         let layout = state.layout();
-        let near = rows::ray(&state, &layout, 0, &beam(), 0, 1.0).unwrap();
+        let near = rows::ray(&state, &layout, 0, &beam(), &place()).unwrap();
         let mut farther = beam();
         farther.range_m += 0.03;
-        let far = rows::ray(&state, &layout, 0, &farther, 0, 1.0).unwrap();
+        let far = rows::ray(&state, &layout, 0, &farther, &place()).unwrap();
         assert!((far.residual - near.residual - 0.03 * (1.0 + 2e-4)).abs() < 1e-6);
         for (a, b) in near.border.iter().zip(&far.border).filter(|(a, _)| a.0 < 6) {
             assert!((a.1 - b.1).abs() < 1e-6);

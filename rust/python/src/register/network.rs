@@ -8,6 +8,7 @@ use lidar_deflect_core::register::start;
 use lidar_deflect_core::register::state::{LidarState, State};
 use lidar_deflect_core::register::surface::{Surface, SurfaceFrame};
 use lidar_deflect_core::register::survey::Known;
+use lidar_deflect_core::register::target::{self, Target, Wanted};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Unit, Vector3};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -116,6 +117,38 @@ impl StaticHold {
         Ok(start::ground(&self.0, &up).map(|plane| (plane.normal.into(), plane.offset_m)))
     }
 
+    /// Turn about the vertical of a levelled lidar that brings what is bright onto targets, given from
+    /// its optical centre in the world's axes with half their size; and how many agree.
+    fn turn_to_targets(
+        &self,
+        levelled: Rows3,
+        targets: Vec<([f64; 3], f64)>,
+        range_rad: f64,
+    ) -> Option<(f64, usize)> {
+        let wanted: Vec<Wanted> = targets
+            .iter()
+            .map(|(from_m, half_m)| Wanted {
+                from_m: Vector3::from(*from_m),
+                half_m: *half_m,
+            })
+            .collect();
+        let clusters = target::clusters(&self.0);
+        target::turn(&clusters, &rotation(&levelled), &wanted, range_rad)
+    }
+
+    /// The sheet nearest to a place of the sensor frame: middle, deviations level and upright, echoes.
+    fn sheet(
+        &self,
+        expected_m: [f64; 3],
+        size_m: f64,
+        within_m: f64,
+    ) -> Option<([f64; 3], [f64; 2], usize)> {
+        let clusters = target::clusters(&self.0);
+        let expected = Vector3::from(expected_m);
+        let found = target::sheet(&self.0, &clusters, &expected, size_m, within_m)?;
+        Some((found.centre_m.into(), found.across_u_m, found.count))
+    }
+
     fn __len__(&self) -> usize {
         self.0.beams.len()
     }
@@ -145,6 +178,9 @@ struct RawSurface {
     half_m: [f64; 2],
 }
 
+/// Lidar, target, centre in the sensor's frame (m), its deviations across the ray and along it (m).
+type RawSight = (usize, usize, [f64; 3], [f64; 2], f64);
+
 /// What is known besides the scans, kind by kind.
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
@@ -155,7 +191,7 @@ struct RawKnown {
     gravity: Vec<(usize, [f64; 3], f64)>,
     distance: Vec<([usize; 2], f64, f64)>,
     target: Vec<(usize, [f64; 3], f64)>,
-    sight: Vec<(usize, usize, [f64; 3], f64, f64)>,
+    sight: Vec<RawSight>,
 }
 
 fn rotation(rows: &Rows3) -> Rotation3<f64> {
@@ -251,7 +287,7 @@ fn adjust_network<'py>(
     holds: Vec<PyRef<'py, StaticHold>>,
     lidars: Vec<RawLidar>,
     surfaces: Vec<RawSurface>,
-    targets: Vec<[f64; 3]>,
+    targets: Vec<([f64; 3], Option<f64>)>,
     known: RawKnown,
     priors: [f64; 3],
 ) -> BorderResult<Bound<'py, PyDict>> {
@@ -260,7 +296,7 @@ fn adjust_network<'py>(
         start: State {
             lidars: lidars.iter().map(lidar).collect(),
             surfaces: surfaces.iter().map(surface).collect(),
-            targets: targets.into_iter().map(Vector3::from).collect(),
+            targets: targets.iter().map(as_target).collect(),
         },
         holds: holds.iter().map(|hold| hold.0.clone()).collect(),
         known: known.all(),
@@ -283,6 +319,14 @@ fn lidar(raw: &RawLidar) -> LidarState {
         elevation_rad: 0.0,
         scale: 0.0,
         offsets_m: vec![0.0; raw.channels],
+        retro_m: 0.0,
+    }
+}
+
+fn as_target((centre_m, radius_m): &([f64; 3], Option<f64>)) -> Target {
+    Target {
+        centre_m: Vector3::from(*centre_m),
+        radius_m: *radius_m,
     }
 }
 
@@ -310,12 +354,16 @@ fn described<'py>(
         entry.set_item("elevation_rad", lidar.elevation_rad)?;
         entry.set_item("scale", lidar.scale)?;
         entry.set_item("offsets_m", lidar.offsets_m.clone().into_pyarray(py))?;
+        entry.set_item("retro_m", lidar.retro_m)?;
         entry.set_item("at", *at)?;
         lidars.append(entry)?;
     }
     all.set_item("lidars", lidars)?;
     all.set_item("surfaces", surfaces_of(py, adjusted)?)?;
-    all.set_item("targets", column3(py, adjusted.state.targets.iter())?)?;
+    all.set_item(
+        "targets",
+        column3(py, adjusted.state.targets.iter().map(|t| &t.centre_m))?,
+    )?;
     all.set_item("covariance", square(py, &adjusted.covariance)?)?;
     let met = |value: fn(&lidar_deflect_core::register::select::Met) -> usize| {
         adjusted
@@ -337,6 +385,11 @@ fn described<'py>(
         all.set_item(*kind, judged(py, own)?)?;
         rest = after;
     }
+    let seen = adjusted.seen.iter();
+    let seen: Vec<_> = seen
+        .map(|s| (s.lidar, s.target, s.count, s.rms_m))
+        .collect();
+    all.set_item("seen", seen)?;
     all.set_item("offset_u_m", adjusted.offset_u_m)?;
     all.set_item("steps", adjusted.steps)?;
     all.set_item("converged", adjusted.converged)?;
