@@ -13,6 +13,7 @@ from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
 from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
 from lidar_deflect.measurement.beam.rig import rig_prior
+from lidar_deflect.measurement.beam.schedule import DRAWN, SETTLED, UNDRAWN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     from lidar_deflect.holds import Hold
     from lidar_deflect.measurement.beam.expected import Expected
+    from lidar_deflect.measurement.beam.schedule import Schedule
     from lidar_deflect.measurement.inputs import Inputs
     from lidar_deflect.measurement.plan import Plan
 
@@ -36,27 +38,6 @@ SEEN_SHARE = 0.45
 """The surface is free to differ from the drawing outboard of this share of the length."""
 ECHOES = 20_000
 """Echoes of a hold that are used, evenly thinned."""
-
-Stages = tuple[tuple[float, float, str], ...]
-
-
-def _stage(name: str, *gates_m: tuple[float, float]) -> Stages:
-    return tuple((echo_m, edge_m, name) for echo_m, edge_m in gates_m)
-
-
-LAST = (0.05, 0.05)
-LOADS = _stage("loads", (3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
-BLADE = _stage("blade", *[(1.0, 1.0)] * 2, *[(0.6, 0.6)] * 2, *[(0.3, 0.4)] * 2, (0.2, 0.2))
-DRAWN = (*LOADS, *BLADE, *_stage("all", (0.1, 0.1), *[LAST] * 3))
-"""Gates of echoes along and of edges across the ray, metres, and what may change, step by step."""
-FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
-SURFACE = _stage("all", *[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8)
-UNDRAWN = (*FAR, *LOADS, *SURFACE)
-"""The same where no drawing tells the prebend and the surface: what bends would bend to fit it."""
-SETTLED = 0.05
-"""An unknown that moves by less than this share of its prior deviation has settled."""
-MAX_LAST = 12
-MAX_LAST_UNDRAWN = 40
 
 NOISE_M, SURFACE_M, EDGE_RAD = 0.015, 0.002, 1e-4
 
@@ -149,7 +130,8 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     drawing = drawing_of(inputs)
     plan = paper.plan_of(inputs)
     native = _started(inputs, drawing, expected, _seen_in(inputs, plan, spans), spans, shares)
-    told, steps = _settle(native, inputs, is_far=drawing.source == "generic")
+    schedule = UNDRAWN if drawing.source == "generic" else DRAWN
+    told, steps = _settle(native, inputs, schedule)
     return Solved(native, holds, spans, shares, told, steps, drawing.source, plan)
 
 
@@ -194,23 +176,21 @@ def _started(
 
 
 def _settle(
-    native: _native.BeamAdjustment, inputs: Inputs, *, is_far: bool
+    native: _native.BeamAdjustment, inputs: Inputs, schedule: Schedule
 ) -> tuple[Mapping[str, Any], int]:
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
-    schedule = UNDRAWN if is_far else DRAWN
     listener = inputs.listener("adjust")
-    total = len(schedule) + (MAX_LAST_UNDRAWN if is_far else MAX_LAST)
     told: dict[str, Any] = {"largest": np.inf}
     steps = 0
-    while steps < len(schedule) or (told["largest"] > SETTLED and steps < total):
-        told = native.step(*(schedule[steps] if steps < len(schedule) else (*LAST, "all")))
+    while steps < len(schedule.first) or (told["largest"] > SETTLED and steps < schedule.most):
+        told = native.step(*schedule.at(steps))
         with suppress(MeasurementError):  # a step too far is brought back by the next ones
             native.linearise()
         steps += 1
         if listener:
-            listener(steps, total)
+            listener(steps, schedule.most)
     if listener:
-        listener(total, total)
+        listener(schedule.most, schedule.most)
     return told | {"holds": [by_lidar(hold, inputs) for hold in told["holds"]]}, steps
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect.measurement.beam.adjustment import LAST
+from lidar_deflect.measurement.beam.schedule import LAST
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.measurement.beam import whiteness
-from lidar_deflect.measurement.beam.adjustment import LAST
 from lidar_deflect.measurement.beam.drawing import saddles_m
 from lidar_deflect.measurement.beam.pulls import pulls
+from lidar_deflect.measurement.beam.schedule import LAST
 from lidar_deflect.measurement.states import Check
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect.measurement.beam.adjustment import LAST, by_lidar, reading
+from lidar_deflect.measurement.beam.adjustment import by_lidar, reading
+from lidar_deflect.measurement.beam.schedule import LAST
 from lidar_deflect.measurement.beam.uncertainty import Spreads
 
 if TYPE_CHECKING:

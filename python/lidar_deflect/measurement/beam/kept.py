@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.errors import MeasurementError
-from lidar_deflect.measurement.beam.adjustment import LAST, solve
+from lidar_deflect.measurement.beam.adjustment import solve
 from lidar_deflect.measurement.beam.expected import still
+from lidar_deflect.measurement.beam.schedule import LAST
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance
 
 if TYPE_CHECKING:

@@ -29,6 +29,7 @@ pub mod sections;
 pub mod shape;
 pub mod sight;
 pub mod start;
+pub mod step;
 mod table;
 pub mod track;
 pub mod weights;
