@@ -85,6 +85,11 @@ impl Mesh {
         self.s_m[self.s_m.len() - 1]
     }
 
+    /// Whether a point of the outline, or the facet behind it, lies on the second side: the pressure side.
+    pub fn is_second_side(&self, vertex: usize) -> bool {
+        vertex >= self.outline[0].len() / 2
+    }
+
     /// Length of an element, metres.
     pub fn step_m(&self, element: usize) -> f64 {
         self.s_m[element + 1] - self.s_m[element]

@@ -140,8 +140,7 @@ impl<'a> Rows<'a> {
     }
 
     fn chord(&self, contact: &Contact) -> f64 {
-        let is_pressure = contact.vertex >= self.adjustment.problem.mesh.outline[0].len() / 2;
-        if is_pressure {
+        if self.adjustment.problem.mesh.is_second_side(contact.vertex) {
             -contact.x_c
         } else {
             contact.x_c
@@ -155,7 +154,7 @@ impl<'a> Rows<'a> {
     }
 
     fn patch(&self, contact: &Contact) -> usize {
-        let is_second_side = contact.vertex >= self.adjustment.problem.mesh.outline[0].len() / 2;
+        let is_second_side = self.adjustment.problem.mesh.is_second_side(contact.vertex);
         common::patch(self.arc_m(contact), is_second_side, contact.x_c)
     }
 

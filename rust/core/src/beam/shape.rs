@@ -120,7 +120,7 @@ impl Shape {
         out: &mut Vec<(usize, f64)>,
     ) {
         let outward = self.waves_m(mesh, contact.section.node) * along.dot(&contact.normal);
-        let side = usize::from(contact.vertex >= mesh.outline[0].len() / 2);
+        let side = usize::from(mesh.is_second_side(contact.vertex));
         let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;
         for (knot, weight) in hats(self.arc_m(mesh, contact) - self.from_m, KNOT_M, self.knots) {
             for wave in 0..CHORD_WAVES {

@@ -35,11 +35,7 @@ pub fn dbscan_graded<T: Coordinate>(
     let cores = scene.find_cores();
     let core_labels = scene.number(&scene.connect(&cores), &cores);
     let sorted_labels = scene.reach_borders(&cores, &core_labels);
-    let mut labels = vec![NOISE; points.len()];
-    for (&place, label) in scene.grid.order.iter().zip(sorted_labels) {
-        labels[place as usize] = label;
-    }
-    Some(labels)
+    Some(scene.grid.unsorted(&sorted_labels))
 }
 
 struct Scene<T> {

@@ -69,6 +69,15 @@ impl<T: Coordinate> Grid<T> {
         self.starts[cells.start] as usize..self.starts[cells.end] as usize
     }
 
+    /// What sorted points have, in the order in which the points came.
+    pub fn unsorted(&self, sorted: &[i32]) -> Vec<i32> {
+        let mut values = vec![0; sorted.len()];
+        for (&place, value) in self.order.iter().zip(sorted) {
+            values[place as usize] = *value;
+        }
+        values
+    }
+
     /// The cells in pieces for threads.
     pub fn blocks(&self) -> Vec<Range<usize>> {
         let starts = (0..self.cells()).step_by(BLOCK);

@@ -34,11 +34,7 @@ pub fn dbscan_uniform<T: Coordinate>(
     let cores = scene.find_cores();
     let cell_labels = scene.number(&scene.connect(&cores), &cores);
     let sorted_labels = scene.label(&cores, &cell_labels);
-    let mut labels = vec![NOISE; points.len()];
-    for (&place, label) in scene.grid.order.iter().zip(sorted_labels) {
-        labels[place as usize] = label;
-    }
-    Some(labels)
+    Some(scene.grid.unsorted(&sorted_labels))
 }
 
 struct Scene<T> {

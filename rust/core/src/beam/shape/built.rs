@@ -78,7 +78,7 @@ fn raised(drawn: &Mesh, node: usize, change: &Change) -> Vec<Vector2<f64>> {
     let lift = |facet: usize, at: usize| {
         let along = point(facet + 1) - point(facet);
         let outward = Vector2::new(-along.y, along.x) * drawn.hand;
-        let side = usize::from(facet >= count / 2);
+        let side = usize::from(drawn.is_second_side(facet));
         let height_m = change.height_m(side, x_c[at]);
         outward.try_normalize(1e-12).unwrap_or_default() * height_m
     };
