@@ -304,6 +304,11 @@ impl Adjustment {
         self.problem.mesh = self.problem.shape.built(&self.drawn, values.as_slice());
     }
 
+    /// What the clock of a lidar is behind the one that all share, seconds.
+    pub fn clock_s(&self, lidar: usize) -> f64 {
+        self.values[self.layout.clock_at(lidar)] * self.rig.clock_s[lidar]
+    }
+
     /// Shared and own unknowns of a hold.
     fn state(&self, hold: usize) -> DVector<f64> {
         let own = self

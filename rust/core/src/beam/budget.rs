@@ -16,7 +16,7 @@ use crate::error::BeamError;
 /// Values of a section of a hold: x, y, z, their changes and that of the whole, twist.
 pub const VALUES: usize = 8;
 /// Names of the groups, in the order of a budget.
-pub const GROUPS: [&str; 11] = [
+pub const GROUPS: [&str; 12] = [
     "range_noise",
     "edge_steps",
     "registration",
@@ -28,6 +28,7 @@ pub const GROUPS: [&str; 11] = [
     "loads",
     "root",
     "sway",
+    "clocks",
 ];
 /// A strain is known beforehand no better than this.
 const STRAIN: f64 = 0.1;
@@ -169,7 +170,8 @@ impl Adjustment {
         for (i, unknown) in self.shared.iter().chain(own).enumerate() {
             groups.push((group_of(unknown.kind), i..i + 1));
         }
-        groups.push((10, layout.sway_at(0)..layout.lidar_at(0)));
+        groups.push((10, layout.sway_at(0)..layout.clock_at(0)));
+        groups.push((11, layout.clock_at(0)..layout.lidar_at(0)));
         for (lidar, channels) in layout.channels.iter().enumerate() {
             let first = layout.lidar_at(lidar);
             groups.push((2, first..first + 6));

@@ -125,6 +125,11 @@ impl<'a> Rows<'a> {
         arc_m
     }
 
+    /// Instant of a shot by the clock that all lidars share, as thought so far.
+    fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
+        stamp_ns + (self.adjustment.clock_s(lidar) * 1e9).round() as i64
+    }
+
     fn hit(
         &self,
         echo: &Echo,
@@ -133,7 +138,7 @@ impl<'a> Rows<'a> {
         hint: Option<f64>,
     ) -> Option<Hit> {
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(echo.time_ns);
+        let blade = self.posed.at(self.time_ns(echo.lidar, echo.time_ns));
         let near = hint.and_then(|s_m| blade.hit(mesh, &lidar.origin, direction, s_m));
         near.or_else(|| {
             let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
@@ -172,7 +177,12 @@ impl<'a> Rows<'a> {
 
     fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
         let along = -hit.contact.normal / hit.cosine;
-        let mut row = self.row(&hit.contact, &along, echo.lidar, echo.time_ns);
+        let mut row = self.row(
+            &hit.contact,
+            &along,
+            echo.lidar,
+            self.time_ns(echo.lidar, echo.time_ns),
+        );
         let layout = &self.adjustment.layout;
         let first = layout.lidar_at(echo.lidar);
         row.push((first + 7, -hit.range_m));
@@ -207,6 +217,9 @@ impl<'a> Rows<'a> {
                     .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
             );
         }
+        let velocity_m_s = self.posed.at(time_ns).velocity_m_s(contact);
+        let clock_s = self.adjustment.rig.clock_s[lidar];
+        row.push((layout.clock_at(lidar), along.dot(&velocity_m_s) * clock_s));
         let (mesh, first) = (&problem.mesh, layout.shape_at());
         problem.shape.slopes(mesh, contact, along, first, &mut row);
         problem.shape.waves(mesh, contact, along, first, &mut row);
@@ -229,13 +242,13 @@ impl<'a> Rows<'a> {
             aside: (miss - hit * hit.dot(&miss)).normalize(),
         };
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(edge.time_ns);
+        let blade = self.posed.at(self.time_ns(edge.lidar, edge.time_ns));
         let near = blade.nearest_s_m(mesh, &plane.origin, &hit);
         let Some(silhouette) = blade.silhouette(mesh, &plane, near) else {
             self.tally.edges_left_out[1] += 1;
             return;
         };
-        if faded(silhouette.soft_m, SOFT_M) == 0.0 {
+        if firmness(&silhouette) == 0.0 {
             self.tally.edges_left_out[0] += 1;
             return;
         }
@@ -284,8 +297,8 @@ impl<'a> Rows<'a> {
         row.push((layout.edge_at(), EDGE_RAD));
         row.push((at, EDGE_OFFSET_RAD));
         let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
-        let firm = faded(silhouette.soft_m, SOFT_M);
-        self.normal.add(&mut row, residual, firm * weight);
+        self.normal
+            .add(&mut row, residual, firmness(silhouette) * weight);
     }
 
     fn edge_row(
@@ -300,8 +313,18 @@ impl<'a> Rows<'a> {
         let slope = silhouette.slope;
         let normal = to.cross(&slope).normalize();
         let along = normal / (normal.dot(&aside) * range);
-        self.row(&silhouette.contact, &along, edge.lidar, edge.time_ns)
+        self.row(
+            &silhouette.contact,
+            &along,
+            edge.lidar,
+            self.time_ns(edge.lidar, edge.time_ns),
+        )
     }
+}
+
+/// Share of its weight that an edge keeps: less where the surface turns away slowly or is seen edge-on.
+fn firmness(silhouette: &Silhouette) -> f64 {
+    faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE)
 }
 
 /// 0 at the leading edge, 1 at the trailing edge.
