@@ -35,8 +35,12 @@ pub const EDGE_OFFSET_RAD: f64 = 1e-4;
 /// they are not equally bright, and what grows with 1 / cos(incidence) - 1; metres.
 pub const RANGE_M: [f64; 2] = [0.001, 0.001];
 
-/// Data are taken for no better than this share of the gate while the gate is wide.
-const COARSE: f64 = 0.1;
+/// Data are taken for no better than this share of the gate while the gate is wide: they are many, and
+/// what they have in common would bend the loads.
+const COARSE: f64 = 0.3;
+
+/// Gate of echoes from which on data count for what they are, metres.
+const FINE_M: f64 = 0.05;
 
 /// A hold as it enters the adjustment.
 #[derive(Debug, Clone)]
@@ -335,8 +339,8 @@ impl Adjustment {
             .chain([strain])
     }
 
-    /// The blade of a hold as estimated so far.
-    pub fn posed(&self, hold: usize) -> Posed {
+    /// The axis of a hold without sway, by the slopes of the last equilibrium.
+    pub(super) fn still(&self, hold: usize) -> Axis {
         let (linear, problem) = (&self.linear[hold], &self.problem);
         let change = self.state(hold) - &linear.values;
         let mut curvature = linear.curvature.clone();
@@ -349,7 +353,13 @@ impl Adjustment {
             root += response.root_rad * *amount;
         }
         let turn = nalgebra::Rotation3::from_scaled_axis(root).matrix() * problem.mesh.root;
-        let still = Axis::integrate(&turn, &problem.mesh.s_m, curvature);
+        Axis::integrate(&turn, &problem.mesh.s_m, curvature)
+    }
+
+    /// The blade of a hold as estimated so far.
+    pub fn posed(&self, hold: usize) -> Posed {
+        let (linear, problem) = (&self.linear[hold], &self.problem);
+        let still = self.still(hold);
         let at = self.layout.sway_at(hold);
         let coefficients: Vec<f64> = (0..self.layout.modes * self.layout.knots[hold])
             .map(|k| self.values[at + k] * self.modes_m[k / self.layout.knots[hold]])
@@ -386,11 +396,16 @@ impl Adjustment {
 }
 
 impl Gates {
+    /// Whether residuals within them tell of the data, not of a blade that is elsewhere.
+    pub fn is_fine(&self) -> bool {
+        self.echo_m <= FINE_M
+    }
+
     /// Standard deviation below which no echo and no edge is taken to be, metres.
     pub fn coarse_m(&self) -> [f64; 2] {
-        match self.stage {
-            Stage::All => [0.0; 2],
-            _ => [COARSE * self.echo_m, COARSE * self.edge_m],
+        match self.is_fine() {
+            true => [0.0; 2],
+            false => [COARSE * self.echo_m, COARSE * self.edge_m],
         }
     }
 }

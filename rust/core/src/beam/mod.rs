@@ -1,6 +1,6 @@
 //! The beam method: a blade that bends as blades bend, fitted to rays and edges of all lidars.
 //!
-//! [`design`] and [`mesh`] hold the drawing, [`equilibrium`] and [`family`] say which states it can
+//! [`design`] and [`mesh`] hold the drawing, [`equilibrium`], [`tangent`] and [`family`] say which states it can
 //! have, [`axis`] keeps its length, [`sight`] meets it with rays and scan planes, [`adjust`] puts
 //! everything into one adjustment, [`common`] says what neighbouring data share, [`track`] follows the blade between
 //! holds and [`carry`] tells how well each instant is known. Source: docs/method.md.
@@ -33,5 +33,6 @@ pub mod start;
 pub mod step;
 pub mod sums;
 mod table;
+pub mod tangent;
 pub mod track;
 pub mod weights;

@@ -10,14 +10,15 @@ use super::posed::{Posed, node_slopes};
 use super::rig::Lidar;
 use super::sight::{Contact, Hit, ScanPlane, Silhouette};
 use super::sums::{BOTH, Part, Row, Sums};
-use super::weights::{EdgeMet, Tally, Used, robust};
+use super::weights::{EdgeMet, Tally, Used, faded, robust};
 
 /// Echoes nearer to the end of their run than this are mixed with what lies behind.
 const MIXED_ECHOES: u32 = 2;
-/// Rays that meet the surface at a flatter angle are left out, cosine of incidence.
-const FLATTEST_COSINE: f64 = 0.25;
-/// An edge beside facets seen at a grazing angle over more than this is soft, metres across.
-const SOFT_M: f64 = 0.012;
+/// Rays that meet the surface at a flatter angle count less, and from the second one on not at all,
+/// cosine of incidence: an echo that comes and goes with the estimate would never let it settle.
+const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
+/// The same of edges beside facets seen at a grazing angle over so much, metres across: they are soft.
+const SOFT_M: (f64, f64) = (0.008, 0.016);
 
 /// Makes the rows of one hold.
 pub struct Rows<'a> {
@@ -97,7 +98,8 @@ impl<'a> Rows<'a> {
             return None;
         };
         let arc_m = Some(self.arc_m(&hit.contact));
-        if echo.from_end < MIXED_ECHOES || hit.cosine < FLATTEST_COSINE {
+        let upright = faded(hit.cosine, FLAT_COSINE);
+        if echo.from_end < MIXED_ECHOES || upright == 0.0 {
             self.tally.unfit += 1;
             return arc_m;
         }
@@ -129,7 +131,7 @@ impl<'a> Rows<'a> {
             None => 1.0 + weights.surface_m * weights.surface_m * alone,
         };
         let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
-        self.add_hit(echo, &hit, residual, weight);
+        self.add_hit(echo, &hit, residual, upright * weight);
         arc_m
     }
 
@@ -255,7 +257,7 @@ impl<'a> Rows<'a> {
             self.tally.edges_left_out[1] += 1;
             return;
         };
-        if silhouette.soft_m > SOFT_M {
+        if faded(silhouette.soft_m, SOFT_M) == 0.0 {
             self.tally.edges_left_out[0] += 1;
             return;
         }
@@ -301,12 +303,13 @@ impl<'a> Rows<'a> {
             step_rad,
         });
         let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
+        let firm = faded(silhouette.soft_m, SOFT_M);
         let edge_at = layout.edge_at();
         let along = across(plane, silhouette);
         let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, edge.time_ns);
         self.entries
             .extend([(edge_at, EDGE_RAD), (at, EDGE_OFFSET_RAD)]);
-        self.add_row(&silhouette.contact, moves, residual, weight);
+        self.add_row(&silhouette.contact, moves, residual, firm * weight);
     }
 }
 

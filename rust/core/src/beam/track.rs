@@ -170,7 +170,7 @@ impl Adjustment {
         gates: &[Gates],
     ) -> Result<Followed, BeamError> {
         for gate in &gates[..gates.len() - 1] {
-            self.step(gate)?;
+            self.slope_step(gate)?;
         }
         let (normal, tally) = self.last_step(&gates[gates.len() - 1])?;
         let factor = self.free_factor(&normal)?;

@@ -180,6 +180,7 @@ impl BeamAdjustment {
         let step = compute(py, self.threads, || core.step(&gates))??;
         let told = PyDict::new(py);
         told.set_item("largest", step.largest)?;
+        told.set_item("moved_m", step.moved_m)?;
         let holds: PyResult<Vec<_>> = step.tallies.iter().map(|t| tally(py, t)).collect();
         told.set_item("holds", holds?)?;
         told.set_item("noise_m", self.core.weights.noise_m.clone())?;
