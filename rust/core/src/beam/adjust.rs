@@ -16,6 +16,7 @@ use super::posed::{Posed, knots};
 use super::rig::{Lidar, Rig};
 use super::rows::Rows;
 use super::shape::Shape;
+use super::sums::Part;
 use super::track::zeros;
 use super::weights::{Tally, Weights};
 use crate::error::BeamError;
@@ -225,15 +226,19 @@ impl Adjustment {
         at: &Axis,
         shared: &[Response],
     ) -> Option<Vec<Response>> {
-        let respond = |unknown: &Unknown| {
-            let same = self.shared.iter().position(|s| s.kind == unknown.kind);
-            if let Some(place) = same.filter(|_| matches!(unknown.kind, Kind::Soft { .. })) {
-                let scale = unknown.sigma / self.shared[place].sigma;
-                return Some(shared[place].scaled(scale));
-            }
-            family::responses(&self.problem.mesh, physics, at, &[*unknown])?.pop()
+        let same = |unknown: &Unknown| {
+            let is_stiffness = matches!(unknown.kind, Kind::Soft { .. });
+            let place = self.shared.iter().position(|s| s.kind == unknown.kind);
+            place.filter(|_| is_stiffness)
         };
-        self.own[hold].iter().map(respond).collect()
+        let own = &self.own[hold];
+        let new: Vec<Unknown> = own.iter().filter(|u| same(u).is_none()).copied().collect();
+        let mut found = family::responses(&self.problem.mesh, physics, at, &new)?.into_iter();
+        let respond = |unknown: &Unknown| match same(unknown) {
+            Some(place) => Some(shared[place].scaled(unknown.sigma / self.shared[place].sigma)),
+            None => found.next(),
+        };
+        own.iter().map(respond).collect()
     }
 
     /// Everything that bends the blade in a hold, as estimated so far.
@@ -327,6 +332,18 @@ impl Adjustment {
             .collect()
     }
 
+    /// Unknowns that data of a hold tell of beside those of its state.
+    pub(super) fn touched_at(&self, hold: usize) -> impl Iterator<Item = usize> {
+        let layout = &self.layout;
+        let sway = layout.sway_at(hold)..layout.sway_at(hold + 1);
+        let edges = layout.edge_offset_at(hold, 0, 0)..layout.edge_offset_at(hold + 1, 0, 0);
+        let strain = layout.len() + hold;
+        sway.chain(layout.lidar_at(0)..layout.edge_at() + 1)
+            .chain(edges)
+            .chain(layout.range_at(0)..layout.len())
+            .chain([strain])
+    }
+
     /// The axis of a hold without sway, by the slopes of the last equilibrium.
     pub(super) fn still(&self, hold: usize) -> Axis {
         let (linear, problem) = (&self.linear[hold], &self.problem);
@@ -369,14 +386,14 @@ impl Adjustment {
         let lidars: Vec<Lidar> = (0..self.rig.poses.len())
             .map(|l| self.rig.lidar(l))
             .collect();
-        let parts: Vec<(Normal, Tally)> = (0..self.problem.holds.len())
+        let parts: Vec<(Part, Tally)> = (0..self.problem.holds.len())
             .into_par_iter()
             .map(|hold| Rows::new(self, hold, &lidars, gates).collect())
             .collect();
         let mut sum = self.prior(gates.stage);
         let mut tallies = Vec::new();
-        for (normal, tally) in parts {
-            sum.join(&normal);
+        for (part, tally) in parts {
+            sum.join(&part);
             tallies.push(tally);
         }
         (sum, tallies)

@@ -11,6 +11,7 @@ use super::layout::RIG;
 use super::normal::Normal;
 use super::rig::Lidar;
 use super::rows::Rows;
+use super::sums::Part;
 use crate::error::BeamError;
 
 /// Values of a section of a hold: x, y, z, their changes and that of the whole, twist.
@@ -153,7 +154,7 @@ impl Adjustment {
             .map(|l| self.rig.lidar(l))
             .collect();
         let of = |hold| Rows::new(self, hold, &lidars, gates).of_edges();
-        let parts: Vec<Normal> = (0..self.problem.holds.len())
+        let parts: Vec<Part> = (0..self.problem.holds.len())
             .into_par_iter()
             .map(of)
             .collect();

@@ -196,20 +196,18 @@ impl Instant<'_> {
             return None;
         }
         let count = mesh.outline[0].len();
-        let section = self.section(mesh, s_m);
-        let view = |vertex: usize| seen(mesh, plane, &across, &section, vertex, s_m);
-        let views: Vec<View> = (0..count).map(view).collect();
-        let outermost = (0..count).max_by(|a, b| views[*a].angle.total_cmp(&views[*b].angle))?;
+        let cut = Cut::new(mesh, plane, self.section(mesh, s_m), s_m);
+        let views: Vec<View> = (0..count).map(|vertex| cut.view(vertex)).collect();
+        let outermost =
+            (0..count).max_by(|a, b| views[*a].width().total_cmp(&views[*b].width()))?;
         let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
         let refined = near.map(|vertex| {
-            (
-                vertex,
-                self.refine(mesh, plane, &across, vertex, views[vertex].s_m),
-            )
+            let view = self.refine(mesh, plane, vertex, views[vertex].s_m);
+            (vertex, view)
         });
         let best = refined
             .iter()
-            .max_by(|a, b| a.1.angle.total_cmp(&b.1.angle))?;
+            .max_by(|a, b| a.1.width().total_cmp(&b.1.width()))?;
         if !(0.0..=mesh.length_m()).contains(&best.1.s_m) {
             return None;
         }
@@ -222,7 +220,7 @@ impl Instant<'_> {
         };
         Some(Silhouette {
             contact,
-            angle_rad: best.1.angle,
+            angle_rad: best.1.aside_m.atan2(best.1.ahead_m),
             range_m: (contact.point - plane.origin).norm(),
             soft_m: softness_m(&views, best.0, step),
             cosine: steepness(&views, best.0, step),
@@ -230,49 +228,63 @@ impl Instant<'_> {
         })
     }
 
-    fn refine(
-        &self,
-        mesh: &Mesh,
-        plane: &ScanPlane,
-        across: &Vector3<f64>,
-        vertex: usize,
-        s_m: f64,
-    ) -> View {
-        let view = |s_m| seen(mesh, plane, across, &self.section(mesh, s_m), vertex, s_m);
+    fn refine(&self, mesh: &Mesh, plane: &ScanPlane, vertex: usize, s_m: f64) -> View {
+        let view = |s_m| Cut::new(mesh, plane, self.section(mesh, s_m), s_m).view(vertex);
         view(view(s_m).s_m)
     }
 }
 
-/// Where a point of the outline passes through a scan plane, by its slope at `s_m` in `section`.
-fn seen(
-    mesh: &Mesh,
-    plane: &ScanPlane,
-    across: &Vector3<f64>,
-    section: &Section,
-    vertex: usize,
+/// A scan plane in the directions of a section.
+struct Cut<'a> {
+    mesh: &'a Mesh,
+    section: Section,
     s_m: f64,
-) -> View {
-    let local = local(mesh, section, vertex, 0.0);
-    let slope = section.turn * span_slope(mesh, section, vertex, 0.0, &local);
-    let point = section.place + section.turn * local;
-    let step = -across.dot(&(point - plane.origin)) / across.dot(&slope);
-    let to = point + slope * step - plane.origin;
-    let (ahead_m, aside_m) = (to.dot(&plane.ahead), to.dot(&plane.aside));
-    View {
-        angle: aside_m.atan2(ahead_m),
-        s_m: s_m + step,
-        ahead_m,
-        aside_m,
+    /// Across the plane, ahead and aside in it: a line each.
+    axes: Matrix3<f64>,
+    /// The section's place along these from the plane's origin, metres.
+    place: Vector3<f64>,
+}
+
+impl<'a> Cut<'a> {
+    fn new(mesh: &'a Mesh, plane: &ScanPlane, section: Section, s_m: f64) -> Self {
+        let across = plane.ahead.cross(&plane.aside);
+        let axes = Matrix3::from_columns(&[across, plane.ahead, plane.aside]).transpose();
+        Self {
+            mesh,
+            s_m,
+            place: axes * (section.place - plane.origin),
+            axes: axes * section.turn,
+            section,
+        }
+    }
+
+    /// Where a point of the outline passes through the plane, by its slope in the section.
+    fn view(&self, vertex: usize) -> View {
+        let local = local(self.mesh, &self.section, vertex, 0.0);
+        let slope = self.axes * span_slope(self.mesh, &self.section, vertex, 0.0, &local);
+        let point = self.place + self.axes * local;
+        let step = -point.x / slope.x;
+        View {
+            s_m: self.s_m + step,
+            ahead_m: point.y + slope.y * step,
+            aside_m: point.z + slope.z * step,
+        }
     }
 }
 
 /// A point of the outline as a scan plane sees it.
 #[derive(Debug, Clone, Copy)]
 struct View {
-    angle: f64,
     s_m: f64,
     ahead_m: f64,
     aside_m: f64,
+}
+
+impl View {
+    /// Tangent of the angle from ahead; the blade is in front of the sensor.
+    fn width(&self) -> f64 {
+        self.aside_m / self.ahead_m
+    }
 }
 
 /// Cosine of incidence on the strip beside the silhouette, on the side that is seen.
