@@ -22,7 +22,7 @@ FIXED = 8
 UNKNOWN_RAD, UNKNOWN_M = 2e-3, 0.02
 """Standard deviation of a pose for which the calibration gives none."""
 
-CLOCK_U_S = {"locked": 1e-4, "utc": 1.5e-3, "free_running": 1.5e-3}
+CLOCK_U_S = {"locked": 1e-4, "utc": 3e-4, "free_running": 3e-4}
 """Standard deviation of a clock against the others, by what is known of it: where nothing holds it
 but the arrival of its packets, switch and recorder delay those of some lidars more than others'."""
 

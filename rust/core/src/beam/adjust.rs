@@ -338,7 +338,7 @@ impl Adjustment {
         let sway = layout.sway_at(hold)..layout.sway_at(hold + 1);
         let edges = layout.edge_offset_at(hold, 0, 0)..layout.edge_offset_at(hold + 1, 0, 0);
         let strain = layout.len() + hold;
-        sway.chain(layout.lidar_at(0)..layout.edge_at() + 1)
+        sway.chain(layout.clock_at(0)..layout.edge_at() + 1)
             .chain(edges)
             .chain(layout.range_at(0)..layout.len())
             .chain([strain])
