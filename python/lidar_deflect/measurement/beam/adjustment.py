@@ -195,7 +195,7 @@ def _settle(
             listener(stage, last)
     if listener:
         listener(last, last)
-    return told | {"holds": [by_lidar(hold, inputs) for hold in told["holds"]]}, steps
+    return told | {"holds": [by_lidar(hold, inputs) for hold in native.told()]}, steps
 
 
 def by_lidar(told: Mapping[str, Any], inputs: Inputs) -> Mapping[str, Any]:

@@ -1,6 +1,7 @@
 //! One adjustment of all holds: states, surface, lidars and edges from rays, edges and what is known.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
@@ -39,6 +40,9 @@ pub const RANGE_M: [f64; 2] = [0.001, 0.001];
 /// what they have in common would bend the loads.
 const COARSE: f64 = 0.3;
 
+/// Echoes of a hold that bring a blade near which is decimetres away: more say the same.
+const COARSE_ECHOES: usize = 2000;
+
 /// Gate of echoes from which on data count for what they are, metres.
 const FINE_M: f64 = 0.05;
 
@@ -46,7 +50,7 @@ const FINE_M: f64 = 0.05;
 #[derive(Debug, Clone)]
 pub struct Hold {
     /// What was seen in it.
-    pub seen: Seen,
+    pub seen: Arc<Seen>,
     /// First and last instant, nanoseconds.
     pub span_ns: (i64, i64),
     /// Loads as they are thought to be.
@@ -404,6 +408,14 @@ impl Gates {
     /// Whether residuals within them tell of the data, not of a blade that is elsewhere.
     pub fn is_fine(&self) -> bool {
         self.echo_m <= FINE_M
+    }
+
+    /// Echoes of a hold that are worth their time; without a drawing each of them tells of the surface.
+    pub(super) fn echoes(&self, is_vague: bool) -> usize {
+        match self.is_fine() || is_vague {
+            true => usize::MAX,
+            false => COARSE_ECHOES,
+        }
     }
 
     /// Standard deviation below which no echo and no edge is taken to be, metres.

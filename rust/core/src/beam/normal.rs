@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::factor::Factor;
 use super::sums::Part;
 
 /// Sums of weighted rows: only the lower triangle of the matrix is kept.
@@ -48,10 +49,9 @@ impl Normal {
         self.rows += part.rows;
     }
 
-    /// Step and covariance; `None` where the matrix is singular.
-    pub fn solve(mut self) -> Option<(DVector<f64>, nalgebra::Cholesky<f64, nalgebra::Dyn>)> {
-        self.matrix.fill_upper_triangle_with_lower_triangle();
-        let factor = self.matrix.cholesky()?;
+    /// Step and factor; `None` where the matrix is singular.
+    pub fn solve(self) -> Option<(DVector<f64>, Factor)> {
+        let factor = Factor::new(self.matrix)?;
         let step = factor.solve(&self.right);
         step.iter()
             .all(|value| value.is_finite())

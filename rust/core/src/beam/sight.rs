@@ -159,12 +159,21 @@ impl Instant<'_> {
         direction: &Vector3<f64>,
         start_m: f64,
     ) -> Option<Hit> {
-        let mut s_m = start_m;
+        let (mut s_m, mut last) = (start_m, None);
         for _ in 0..STEPS {
             let section = self.section(mesh, s_m);
             let from = section.turn.tr_mul(&(origin - section.place));
             let way = section.turn.tr_mul(direction);
-            let (edge, along, range_m) = cross(mesh, &section, &from, &way)?;
+            let line = Line {
+                mesh,
+                section: &section,
+                from: &from,
+                way: &way,
+            };
+            let (edge, along, range_m) = last
+                .and_then(|edge| line.cross_near(edge))
+                .or_else(|| line.cross())?;
+            last = Some(edge);
             let ahead_m = from.z + way.z * range_m;
             if ahead_m.abs() < CONVERGED_M {
                 let contact = contact(mesh, section, edge, along);
@@ -337,42 +346,64 @@ fn is_seen_ahead(views: &[View], outermost: usize) -> bool {
     depth(1) < depth(count - 1)
 }
 
-/// First facet of the outline that a line in the section's plane enters: its first point, the place
-/// on it, and the distance along the line.
-fn cross(
-    mesh: &Mesh,
-    section: &Section,
-    from: &Vector3<f64>,
-    way: &Vector3<f64>,
-) -> Option<(usize, f64, f64)> {
-    let (inner, outer) = (&mesh.outline[section.node], &mesh.outline[section.node + 1]);
-    let at = |i: usize| {
-        let (a, b) = (inner[i], outer[i]);
-        (
-            a[0] + (b[0] - a[0]) * section.share - from.x,
-            a[1] + (b[1] - a[1]) * section.share - from.y,
-        )
-    };
-    let side = |p: (f64, f64)| way.x * p.1 - way.y * p.0;
-    let count = inner.len();
-    let mut best: Option<(usize, f64, f64)> = None;
-    let mut last = at(count - 1);
-    let mut last_side = side(last);
-    for i in 0..count {
-        let point = at(i);
-        let this_side = side(point);
-        if (last_side > 0.0) != (this_side > 0.0) {
-            let along = last_side / (last_side - this_side);
-            let x = last.0 + (point.0 - last.0) * along;
-            let y = last.1 + (point.1 - last.1) * along;
-            let range = (x * way.x + y * way.y) / (way.x * way.x + way.y * way.y);
-            if range > 0.0 && best.is_none_or(|b| range < b.2) {
-                best = Some(((i + count - 1) % count, along, range));
-            }
-        }
-        (last, last_side) = (point, this_side);
+/// A line in the plane of a section, in its directions.
+struct Line<'a> {
+    mesh: &'a Mesh,
+    section: &'a Section,
+    from: &'a Vector3<f64>,
+    way: &'a Vector3<f64>,
+}
+
+/// First point of a facet, the place on it, and the distance along a line that crosses it.
+type Crossing = (usize, f64, f64);
+
+impl Line<'_> {
+    /// First facet of the outline that the line meets.
+    fn cross(&self) -> Option<Crossing> {
+        let count = self.mesh.outline[self.section.node].len();
+        self.first((count - 1..count).chain(0..count))
     }
-    best
+
+    /// The same among those beside a facet that it met a little farther along the span.
+    fn cross_near(&self, edge: usize) -> Option<Crossing> {
+        let count = self.mesh.outline[self.section.node].len();
+        self.first((edge + count - 1..edge + count + 3).map(|i| i % count))
+    }
+
+    /// First facet that the line meets among those between neighbouring points.
+    fn first(&self, points: impl Iterator<Item = usize>) -> Option<Crossing> {
+        let way = self.way;
+        let side = |p: (f64, f64)| way.x * p.1 - way.y * p.0;
+        let mut points = points.map(|i| (i, self.at(i)));
+        let (mut index, mut last) = points.next()?;
+        let mut last_side = side(last);
+        let mut best: Option<Crossing> = None;
+        for (next, point) in points {
+            let this_side = side(point);
+            if (last_side > 0.0) != (this_side > 0.0) {
+                let along = last_side / (last_side - this_side);
+                let x = last.0 + (point.0 - last.0) * along;
+                let y = last.1 + (point.1 - last.1) * along;
+                let range = (x * way.x + y * way.y) / (way.x * way.x + way.y * way.y);
+                if range > 0.0 && best.is_none_or(|b| range < b.2) {
+                    best = Some((index, along, range));
+                }
+            }
+            (index, last, last_side) = (next, point, this_side);
+        }
+        best
+    }
+
+    /// A point of the outline from the start of the line.
+    fn at(&self, i: usize) -> (f64, f64) {
+        let node = self.section.node;
+        let (a, b) = (self.mesh.outline[node][i], self.mesh.outline[node + 1][i]);
+        let share = self.section.share;
+        (
+            a[0] + (b[0] - a[0]) * share - self.from.x,
+            a[1] + (b[1] - a[1]) * share - self.from.y,
+        )
+    }
 }
 
 /// Point of the outline at a vertex and a share of the way to the next one.

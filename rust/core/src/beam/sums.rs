@@ -46,7 +46,7 @@ pub struct Sums {
     near: DMatrix<f64>,
     /// Others with moves: a column per move.
     cross: DMatrix<f64>,
-    /// Others with each other, lower triangle.
+    /// Others with each other; each product once, on either side of the diagonal.
     own: DMatrix<f64>,
     panel: Panel,
     touched: Vec<usize>,
@@ -141,18 +141,12 @@ impl Sums {
         let own = if i < MOVES { 0 } else { MOVES };
         let mut near = self.near.column_mut(column);
         (i..BOTH).for_each(|k| near[k - own] += moves[k]);
-        let mut cross = self.cross.column_mut(column);
-        for (place, product) in others.0.iter().zip(others.1) {
-            cross[*place] += product;
-        }
+        scatter(&mut self.cross, column, others.0, others.1);
     }
 
     /// Adds the products of the `i`-th other with those after it.
     fn add_other(&mut self, i: usize, places: &[usize], products: &[f64]) {
-        let one = places[i];
-        for (two, product) in places.iter().zip(products).skip(i) {
-            self.own[(one.max(*two), one.min(*two))] += product;
-        }
+        scatter(&mut self.own, places[i], &places[i..], &products[i..]);
     }
 
     /// The sums by unknowns: `state` are those of the state, each with a column of `moves` that says what
@@ -166,6 +160,7 @@ impl Sums {
         let crossed = &self.cross * moves;
         let below = crossed.rows(1, size);
         matrix.view_mut((inner, 0), (size, inner)).copy_from(&below);
+        self.fold();
         let own = self.own.view((1, 1), (size, size));
         matrix
             .view_mut((inner, inner), (size, size))
@@ -178,6 +173,15 @@ impl Sums {
             right: of_state.iter().chain(of_others.iter()).copied().collect(),
             cost: self.own[(0, 0)],
             rows: self.rows,
+        }
+    }
+
+    /// Brings the products of others to the lower triangle.
+    fn fold(&mut self) {
+        for j in 0..self.own.ncols() {
+            for i in j + 1..self.own.nrows() {
+                self.own[(i, j)] += self.own[(j, i)];
+            }
         }
     }
 
@@ -198,6 +202,15 @@ impl Sums {
             }
         }
         product
+    }
+}
+
+/// Adds products to some rows of a column.
+fn scatter(sums: &mut DMatrix<f64>, column: usize, rows: &[usize], products: &[f64]) {
+    let count = sums.nrows();
+    let sums = &mut sums.as_mut_slice()[column * count..][..count];
+    for (row, product) in rows.iter().zip(products) {
+        sums[*row] += product;
     }
 }
 
