@@ -13,7 +13,7 @@ from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
 from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
 from lidar_deflect.measurement.beam.rig import rig_prior
-from lidar_deflect.measurement.beam.schedule import DRAWN, SETTLED, UNDRAWN
+from lidar_deflect.measurement.beam.schedule import DRAWN, PATIENCE, SETTLED, UNDRAWN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -162,6 +162,7 @@ def _started(
         full_n=full_n,
         poses=rig.poses,
         channels=rig.channels,
+        clock_s=rig.clock_u_s,
         rig_prior=rig.values,
         rig_covariance=rig.covariance,
         from_m=SEEN_SHARE * inputs.config.blade.length_m,
@@ -180,18 +181,21 @@ def _settle(
 ) -> tuple[Mapping[str, Any], int]:
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
     listener = inputs.listener("adjust")
+    stages, steps, tries = len(schedule.first), 0, 0
+    stage, last = 0, stages + schedule.more
     told: dict[str, Any] = {"largest": np.inf}
-    steps = 0
-    while steps < len(schedule.first) or (told["largest"] > SETTLED and steps < schedule.most):
-        told = native.step(*schedule.at(steps))
+    while stage < stages or (told["largest"] > SETTLED and stage < last):
+        told = native.step(*schedule.at(stage))
         with suppress(MeasurementError):  # a step too far is brought back by the next ones
             native.linearise()
-        steps += 1
+        steps, tries = steps + 1, tries + 1
+        if stage >= stages or tries >= PATIENCE or schedule.is_near(stage, told["moved_m"]):
+            stage, tries = stage + 1, 0
         if listener:
-            listener(steps, schedule.most)
+            listener(stage, last)
     if listener:
-        listener(schedule.most, schedule.most)
-    return told | {"holds": [by_lidar(hold, inputs) for hold in told["holds"]]}, steps
+        listener(last, last)
+    return told | {"holds": [by_lidar(hold, inputs) for hold in native.told()]}, steps
 
 
 def by_lidar(told: Mapping[str, Any], inputs: Inputs) -> Mapping[str, Any]:
