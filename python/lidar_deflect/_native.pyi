@@ -460,6 +460,9 @@ class BeamAdjustment:
         gates: Sequence[tuple[float, float]],
         sway_m: Sequence[float],
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]] | None]: ...
+    def set_clocks(
+        self, offset_s: Sequence[float], deviation_s: Sequence[float], tied: bool
+    ) -> None: ...
     def values(self) -> NDArray[np.float64]: ...
     def budget(
         self, s_m: Sequence[float], echo_m: float, edge_m: float

@@ -11,8 +11,9 @@ import numpy as np
 from lidar_deflect import _native
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
+from lidar_deflect.measurement.beam.clocks import unknown
 from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
-from lidar_deflect.measurement.beam.rig import rig_prior
+from lidar_deflect.measurement.beam.rig import RigPrior, rig_prior
 from lidar_deflect.measurement.beam.schedule import DRAWN, PATIENCE, SETTLED, UNDRAWN
 
 if TYPE_CHECKING:
@@ -61,6 +62,8 @@ class Solved:
         Where the blade's shape began: ``drawing`` or ``generic``.
     plan
         Where the blade is looked for.
+    clocks
+        What holds the clock of each stand of a lidar.
     """
 
     native: _native.BeamAdjustment
@@ -71,6 +74,7 @@ class Solved:
     steps: int
     source: str
     plan: Plan
+    clocks: tuple[str, ...]
 
 
 def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
@@ -129,15 +133,19 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     shares = tuple(shares[i] for i in order)
     drawing = drawing_of(inputs)
     plan = paper.plan_of(inputs)
-    native = _started(inputs, drawing, expected, _seen_in(inputs, plan, spans), spans, shares)
+    rig = rig_prior(inputs)
+    seen = _seen_in(inputs, plan, spans)
+    native = _started(inputs, drawing, rig, expected, seen, spans, shares)
     schedule = UNDRAWN if drawing.source == "generic" else DRAWN
     told, steps = _settle(native, inputs, schedule)
-    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan)
+    clocks = tuple(rig.clocks)
+    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan, clocks)
 
 
 def _started(
     inputs: Inputs,
     drawing: Drawing,
+    rig: RigPrior,
     expected: Expected,
     seen: Sequence[_native.BeamSeen],
     spans: Sequence[tuple[int, int]],
@@ -153,7 +161,6 @@ def _started(
             hint="check [prediction] against the stiffness of the geometry",
         )
     full_n = forces[:, None] * expected.direction
-    rig = rig_prior(inputs)
     return _native.BeamAdjustment(
         drawing.blade,
         seen,
@@ -162,7 +169,7 @@ def _started(
         full_n=full_n,
         poses=rig.poses,
         channels=rig.channels,
-        clock_s=rig.clock_u_s,
+        clock_s=unknown(rig.clocks).tolist(),
         rig_prior=rig.values,
         rig_covariance=rig.covariance,
         from_m=SEEN_SHARE * inputs.config.blade.length_m,

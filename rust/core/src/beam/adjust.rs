@@ -7,6 +7,7 @@ use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::axis::Axis;
+use super::clocks::Clocks;
 use super::echoes::Seen;
 use super::equilibrium::Physics;
 use super::family::{self, Kind, Loading, Response, Trust, Unknown};
@@ -129,6 +130,10 @@ pub struct Adjustment {
     pub(super) knot_ns: i64,
     /// Whether the first mode in time is the load.
     pub(super) follows_load: bool,
+    /// What is known of the clocks in stretches between holds, where that is more than in them.
+    pub clocks: Option<Clocks>,
+    /// Whether the mean of the clocks is held.
+    pub(super) ties_clocks: bool,
     /// Lidars and sides whose edges do not count.
     pub(super) muted: Vec<(usize, usize)>,
     pub(super) shared: Vec<Unknown>,
@@ -167,6 +172,8 @@ impl Adjustment {
             knot_ns: KNOT_NS,
             follows_load: false,
             muted: Vec::new(),
+            clocks: None,
+            ties_clocks: false,
             layout,
             rig,
             weights,
@@ -289,6 +296,7 @@ impl Adjustment {
             free: self.free.clone(),
             modes_m: self.modes_m.clone(),
             muted: self.muted.clone(),
+            clocks: None,
             shared: self.shared.clone(),
             own: self.own.clone(),
             drawn: self.drawn.clone(),

@@ -9,6 +9,7 @@ pub mod adjust;
 pub mod axis;
 pub mod budget;
 pub mod carry;
+pub mod clocks;
 pub mod common;
 pub mod design;
 pub mod echoes;

@@ -7,6 +7,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::adjust::{Adjustment, Gates, Hold, Problem};
 use super::carry::{Knowledge, Spread};
+use super::clocks::ClockNews;
 use super::echoes::Seen;
 use super::family::{self, Loading};
 use super::layout::RANGES;
@@ -155,6 +156,9 @@ impl Adjustment {
             part.values[sway + k] = (load - middle) / LOAD_SHARE;
         }
         part.expected = part.values.clone();
+        if let Some(clocks) = &self.clocks {
+            part.set_clocks(clocks);
+        }
     }
 
     /// What became of the data, and states at instants: per instant and section x, y, z in metres and
@@ -188,6 +192,7 @@ impl Adjustment {
             None => Vec::new(),
         };
         let mut found = Followed {
+            clocks: self.clock_news(&known),
             tally,
             values: Vec::new(),
             spreads: Vec::new(),
@@ -265,6 +270,8 @@ pub struct Followed {
     pub values: Vec<[f64; 4]>,
     /// How well they are known.
     pub spreads: Vec<Spread>,
+    /// What it tells of the clocks; none where it tells nothing.
+    pub clocks: Option<ClockNews>,
 }
 
 /// Holds whose loads lie on both sides of a load, and the share of the way between them.

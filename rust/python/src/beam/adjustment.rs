@@ -4,6 +4,7 @@ use std::sync::atomic::Ordering;
 
 use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem, Stage};
 use lidar_deflect_core::beam::carry::{Knowledge, Spread};
+use lidar_deflect_core::beam::clocks::{ClockNews, Clocks};
 use lidar_deflect_core::beam::family::{Loading, Trust};
 use lidar_deflect_core::beam::rig::Rig;
 use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
@@ -298,14 +299,29 @@ impl BeamAdjustment {
         })?;
         let hand = |followed: Option<Followed>| -> PyResult<_> {
             let Some(f) = followed else { return Ok(None) };
+            let told = tally(py, &f.tally)?;
+            told.set_item(
+                "clocks",
+                f.clocks.map(|news| clock_news(py, &news)).transpose()?,
+            )?;
             let parts = (
                 arrays::rows(py, f.values)?,
                 spread_rows(py, &f.spreads)?,
-                tally(py, &f.tally)?,
+                told,
             );
             Ok(Some(parts))
         };
         Ok(found.into_iter().map(hand).collect::<PyResult<Vec<_>>>()?)
+    }
+
+    /// What is known of the lidars' clocks in stretches: offsets and deviations in seconds, and whether their
+    /// mean is held, where offsets are looked for.
+    fn set_clocks(&mut self, offset_s: Vec<f64>, deviation_s: Vec<f64>, tied: bool) {
+        self.core.clocks = Some(Clocks {
+            offset_s,
+            deviation_s,
+            tied,
+        });
     }
 
     /// All unknowns, in standard deviations; those of the lidars in their own units.
@@ -443,6 +459,22 @@ fn spread_rows<'py>(py: Python<'py>, spreads: &[Spread]) -> PyResult<Bound<'py, 
         entries.chain([spread.twist]).collect::<Vec<f64>>()
     };
     arrays::table(py, spreads.iter().flat_map(of).collect(), 13)
+}
+
+/// Information of the clocks' offsets (lidars, lidars) in 1/s^2, and that times the offsets, 1/s.
+fn clock_news<'py>(
+    py: Python<'py>,
+    news: &ClockNews,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let rows: Vec<Vec<f64>> = news
+        .information
+        .row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect();
+    Ok((
+        PyArray2::from_vec2(py, &rows)?,
+        news.right.as_slice().to_vec().into_pyarray(py),
+    ))
 }
 
 fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {
