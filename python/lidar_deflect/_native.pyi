@@ -426,6 +426,7 @@ class BeamAdjustment:
         full_n: NDArray[np.float64],
         poses: NDArray[np.float64],
         channels: Sequence[int],
+        clock_s: Sequence[float],
         rig_prior: NDArray[np.float64],
         rig_covariance: NDArray[np.float64],
         from_m: float,

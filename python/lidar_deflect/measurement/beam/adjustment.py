@@ -162,6 +162,7 @@ def _started(
         full_n=full_n,
         poses=rig.poses,
         channels=rig.channels,
+        clock_s=rig.clock_u_s,
         rig_prior=rig.values,
         rig_covariance=rig.covariance,
         from_m=SEEN_SHARE * inputs.config.blade.length_m,

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 STRETCH_NS = 800_000_000
 """Time that is followed at once ..."""
+LOAD_SHARE = 0.15
+"""Less of it where the load changes by more: what the holds tell is taken between their loads."""
 OVERLAP_NS = 250_000_000
 """... and what of its neighbours helps it."""
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
@@ -89,7 +91,7 @@ def follow(
         in_hold[inside] = number
         points.append(told)
     listener = inputs.listener("measure")
-    stretches = _stretches(times_ns, in_hold)
+    stretches = _stretches(times_ns, in_hold, expected.at(times_ns))
     spans = [_span(times_ns, inside) for inside in stretches]
     feed = reading(inputs, solved.plan, spans)
     for start in range(0, len(stretches), CHUNK):
@@ -110,16 +112,19 @@ def follow(
     return Followed(values, spreads, used, in_hold, _joined(points))
 
 
-def _stretches(times_ns: Times, in_hold: NDArray[np.int64]) -> list[NDArray[np.intp]]:
-    """Moments between holds, cut into stretches."""
+def _stretches(
+    times_ns: Times, in_hold: NDArray[np.int64], shares: Floats
+) -> list[NDArray[np.intp]]:
+    """Moments between holds, cut into stretches; `shares` are the loads at all moments."""
     between = np.flatnonzero(in_hold < 0)
     if not between.size:
         return []
     breaks = [0]
     for place in range(1, len(between)):
         goes_on = between[place] == between[place - 1] + 1
-        length = times_ns[between[place]] - times_ns[between[breaks[-1]]]
-        if not goes_on or length >= STRETCH_NS:
+        now, start = between[place], between[breaks[-1]]
+        is_long = times_ns[now] - times_ns[start] >= STRETCH_NS
+        if not goes_on or is_long or abs(shares[now] - shares[start]) > LOAD_SHARE:
             breaks.append(place)
     return np.split(between, breaks[1:])
 

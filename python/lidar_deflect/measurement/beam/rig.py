@@ -22,6 +22,10 @@ FIXED = 8
 UNKNOWN_RAD, UNKNOWN_M = 2e-3, 0.02
 """Standard deviation of a pose for which the calibration gives none."""
 
+CLOCK_U_S = {"locked": 1e-4, "utc": 3e-4, "free_running": 3e-4}
+"""Standard deviation of a clock against the others, by what is known of it: where nothing holds it
+but the arrival of its packets, switch and recorder delay those of some lidars more than others'."""
+
 UNIT_U_M = 0.01
 """Standard deviation of what all channels of a unit have in common in their range offsets."""
 
@@ -36,12 +40,15 @@ class RigPrior:
         Shape (n, 4, 4).
     channels
         Channels of each lidar.
+    clock_u_s
+        Standard deviation of each lidar's clock against the others.
     values, covariance
         Per lidar rotation (rad), translation (m), elevation (rad), range scale, offsets (m).
     """
 
     poses: Floats
     channels: list[int]
+    clock_u_s: list[float]
     values: Floats
     covariance: Floats
 
@@ -55,9 +62,10 @@ def rig_prior(inputs: Inputs) -> RigPrior:
     joint: Any = getattr(inputs.calibration, "joint", None)
     if joint is not None:
         _take_joint(joint, inputs.lidars, channels, values, covariance)
-    known = RigPrior(
-        np.array([pose.world_from_sensor for pose in poses]), channels, values, covariance
-    )
+    streams = [inputs.capture.streams[number] for number in inputs.capture.numbers(inputs.lidars)]
+    clocks = [CLOCK_U_S[stream.clock_kind] for stream in streams]
+    placed = np.array([pose.world_from_sensor for pose in poses])
+    known = RigPrior(placed, channels, clocks, values, covariance)
     return _with_moves(known, inputs) if inputs.moves else known
 
 
@@ -72,7 +80,8 @@ def _with_moves(known: RigPrior, inputs: Inputs) -> RigPrior:
         own = slice(start, start + 6)
         covariance[own, own] += move.covariance
     poses = [*known.poses, *(move.world_from_sensor for move in inputs.moves)]
-    return RigPrior(np.array(poses), channels, known.values[same], covariance)
+    clocks = [known.clock_u_s[lidar] for lidar in inputs.stands]
+    return RigPrior(np.array(poses), channels, clocks, known.values[same], covariance)
 
 
 def _channels(inputs: Inputs, lidar: str) -> int:

@@ -313,6 +313,11 @@ impl Adjustment {
         self.problem.mesh = self.problem.shape.built(&self.drawn, values.as_slice());
     }
 
+    /// What the clock of a lidar is behind the one that all share, seconds.
+    pub fn clock_s(&self, lidar: usize) -> f64 {
+        self.values[self.layout.clock_at(lidar)] * self.rig.clock_s[lidar]
+    }
+
     /// Shared and own unknowns of a hold.
     fn state(&self, hold: usize) -> DVector<f64> {
         let own = self
@@ -337,7 +342,7 @@ impl Adjustment {
         let sway = layout.sway_at(hold)..layout.sway_at(hold + 1);
         let edges = layout.edge_offset_at(hold, 0, 0)..layout.edge_offset_at(hold + 1, 0, 0);
         let strain = layout.len() + hold;
-        sway.chain(layout.sway_at(layout.knots.len())..layout.edge_at() + 1)
+        sway.chain(layout.clock_at(0)..layout.edge_at() + 1)
             .chain(edges)
             .chain(layout.range_at(0)..layout.len())
             .chain([strain])

@@ -19,7 +19,7 @@ use crate::error::BeamError;
 /// Values of a section of a hold: x, y, z, their changes and that of the whole, twist.
 pub const VALUES: usize = 8;
 /// Names of the groups, in the order of a budget.
-pub const GROUPS: [&str; 11] = [
+pub const GROUPS: [&str; 12] = [
     "range_noise",
     "edge_steps",
     "registration",
@@ -31,6 +31,7 @@ pub const GROUPS: [&str; 11] = [
     "loads",
     "root",
     "sway",
+    "clocks",
 ];
 /// Weights of a change of no length have no direction: below this it has none, metres.
 const STILL_M: f64 = 1e-9;
@@ -145,7 +146,8 @@ impl Adjustment {
         for (i, unknown) in self.shared.iter().chain(own).enumerate() {
             groups.push((group_of(unknown.kind), i..i + 1));
         }
-        groups.push((10, layout.sway_at(0)..layout.lidar_at(0)));
+        groups.push((10, layout.sway_at(0)..layout.clock_at(0)));
+        groups.push((11, layout.clock_at(0)..layout.lidar_at(0)));
         for (lidar, channels) in layout.channels.iter().enumerate() {
             let first = layout.lidar_at(lidar);
             groups.push((2, first..first + 6));

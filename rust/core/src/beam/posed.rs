@@ -87,6 +87,7 @@ impl Posed {
             before: &self.shapes[step as usize],
             after: &self.shapes[step as usize + 1],
             share: share.clamp(0.0, 1.0),
+            apart_s: GRID_NS as f64 * 1e-9,
         }
     }
 
@@ -96,6 +97,7 @@ impl Posed {
             before: &self.still,
             after: &self.still,
             share: 0.0,
+            apart_s: GRID_NS as f64 * 1e-9,
         }
     }
 

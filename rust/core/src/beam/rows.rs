@@ -136,6 +136,11 @@ impl<'a> Rows<'a> {
         arc_m
     }
 
+    /// Instant of a shot by the clock that all lidars share, as thought so far.
+    fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
+        stamp_ns + (self.adjustment.clock_s(lidar) * 1e9).round() as i64
+    }
+
     fn hit(
         &self,
         echo: &Echo,
@@ -144,7 +149,7 @@ impl<'a> Rows<'a> {
         hint: Option<f64>,
     ) -> Option<Hit> {
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(echo.time_ns);
+        let blade = self.posed.at(self.time_ns(echo.lidar, echo.time_ns));
         let near = hint.and_then(|s_m| blade.hit(mesh, &lidar.origin, direction, s_m));
         near.or_else(|| {
             let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
@@ -181,7 +186,8 @@ impl<'a> Rows<'a> {
 
     fn add_hit(&mut self, echo: &Echo, hit: &Hit, residual: f64, weight: f64) {
         let along = -hit.contact.normal / hit.cosine;
-        let moves = self.fill_row(&hit.contact, &along, echo.lidar, echo.time_ns);
+        let time_ns = self.time_ns(echo.lidar, echo.time_ns);
+        let moves = self.fill_row(&hit.contact, &along, echo.lidar, time_ns);
         let layout = &self.adjustment.layout;
         let first = layout.lidar_at(echo.lidar);
         self.entries.push((first + 7, -hit.range_m));
@@ -228,6 +234,9 @@ impl<'a> Rows<'a> {
                     .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
             );
         }
+        let velocity_m_s = self.posed.at(time_ns).velocity_m_s(contact);
+        let clock_s = self.adjustment.rig.clock_s[lidar];
+        row.push((layout.clock_at(lidar), along.dot(&velocity_m_s) * clock_s));
         if self.adjustment.free.end > layout.lidar_at(0) {
             let (mesh, first) = (&problem.mesh, layout.shape_at());
             problem.shape.slopes(mesh, contact, along, first, row);
@@ -252,13 +261,13 @@ impl<'a> Rows<'a> {
             aside: (miss - hit * hit.dot(&miss)).normalize(),
         };
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(edge.time_ns);
+        let blade = self.posed.at(self.time_ns(edge.lidar, edge.time_ns));
         let near = blade.nearest_s_m(mesh, &plane.origin, &hit);
         let Some(silhouette) = blade.silhouette(mesh, &plane, near) else {
             self.tally.edges_left_out[1] += 1;
             return;
         };
-        if faded(silhouette.soft_m, SOFT_M) == 0.0 {
+        if firmness(&silhouette) == 0.0 {
             self.tally.edges_left_out[0] += 1;
             return;
         }
@@ -304,13 +313,18 @@ impl<'a> Rows<'a> {
             step_rad,
         });
         let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
-        let firm = faded(silhouette.soft_m, SOFT_M);
         let edge_at = layout.edge_at();
         let along = across(plane, silhouette);
-        let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, edge.time_ns);
+        let time_ns = self.time_ns(edge.lidar, edge.time_ns);
+        let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
         self.entries
             .extend([(edge_at, EDGE_RAD), (at, EDGE_OFFSET_RAD)]);
-        self.add_row(&silhouette.contact, moves, residual, firm * weight);
+        self.add_row(
+            &silhouette.contact,
+            moves,
+            residual,
+            firmness(silhouette) * weight,
+        );
     }
 }
 
@@ -326,6 +340,11 @@ fn across(plane: &ScanPlane, silhouette: &Silhouette) -> Vector3<f64> {
 /// How the range errors of a lidar add to its ranges, metres.
 fn range_slopes_m(cosine: f64) -> [f64; 2] {
     [RANGE_M[0], RANGE_M[1] * (1.0 / cosine - 1.0)]
+}
+
+/// Share of its weight that an edge keeps: less where the surface turns away slowly or is seen edge-on.
+fn firmness(silhouette: &Silhouette) -> f64 {
+    faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE)
 }
 
 /// 0 at the leading edge, 1 at the trailing edge.
@@ -348,7 +367,7 @@ mod tests {
     #[test]
     fn slopes_of_all_unknowns_are_those_of_the_residuals() {
         let adjustment = sample::adjustment(0.02);
-        let (normal, _) = adjustment.normal(&WIDE);
+        let ((normal, _), prior) = (adjustment.normal(&WIDE), adjustment.prior(WIDE.stage));
         let step = 0.02;
         let cost = |unknown: usize, change: f64| {
             let mut moved = adjustment.clone();
@@ -361,7 +380,8 @@ mod tests {
             // Unknowns of the lidars have units of their own.
             let step = if rig.contains(&unknown) { 1e-5 } else { step };
             let slope = (cost(unknown, step) - cost(unknown, -step)) / (2.0 * step);
-            let expected = -2.0 * normal.right[unknown];
+            // The cost is that of the data, without what was known before.
+            let expected = -2.0 * (normal.right[unknown] - prior.right[unknown]);
             let close = (slope - expected).abs() < 0.03 * expected.abs() + 2e-3 * scale;
             assert!(close, "unknown {unknown}: {slope} instead of {expected}");
         }

@@ -83,6 +83,7 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
     let rig = Rig::new(
         vec![pose],
         vec![CHANNELS],
+        vec![1e-3],
         DVector::zeros(size),
         DMatrix::identity(size, size) * 1e-6,
     );

@@ -20,6 +20,8 @@ pub struct Instant<'a> {
     pub after: &'a Axis,
     /// Share of the way between both.
     pub share: f64,
+    /// Time between both, seconds.
+    pub apart_s: f64,
 }
 
 /// A section at one instant.
@@ -76,6 +78,8 @@ pub struct Silhouette {
     pub range_m: f64,
     /// Width of the strip beside it that is seen at a grazing angle, metres across the view.
     pub soft_m: f64,
+    /// Cosine of incidence on the strip beside it: a blade seen edge-on has no edge that echoes tell.
+    pub cosine: f64,
     /// World direction of the silhouette along the span, per metre of arc length.
     pub slope: Vector3<f64>,
 }
@@ -110,6 +114,15 @@ impl Instant<'_> {
             curvature: self.before.curvature[node] * (1.0 - self.share)
                 + self.after.curvature[node] * self.share,
         }
+    }
+
+    /// How fast a point of the surface moves, world, metres per second.
+    pub fn velocity_m_s(&self, contact: &Contact) -> Vector3<f64> {
+        let (section, local) = (&contact.section, &contact.local);
+        let at = |axis: &Axis, node: usize| axis.place[node] + axis.turn[node] * local;
+        let moved = |node: usize| at(self.after, node) - at(self.before, node);
+        let (inner, outer) = (moved(section.node), moved(section.node + 1));
+        (inner + (outer - inner) * section.share) / self.apart_s
     }
 
     fn turn(&self, node: usize) -> Matrix3<f64> {
@@ -209,11 +222,17 @@ impl Instant<'_> {
         }
         let section = self.section(mesh, best.1.s_m);
         let contact = contact(mesh, section, best.0, 0.0);
+        let step = if is_seen_ahead(&views, best.0) {
+            1
+        } else {
+            count - 1
+        };
         Some(Silhouette {
             contact,
             angle_rad: best.1.aside_m.atan2(best.1.ahead_m),
             range_m: (contact.point - plane.origin).norm(),
-            soft_m: softness_m(&views, best.0),
+            soft_m: softness_m(&views, best.0, step),
+            cosine: steepness(&views, best.0, step),
             slope: section.turn * span_slope(mesh, &section, best.0, 0.0, &contact.local),
         })
     }
@@ -277,14 +296,23 @@ impl View {
     }
 }
 
-/// Width across the view of the facets beside the silhouette that are seen at a grazing angle.
-fn softness_m(views: &[View], outermost: usize) -> f64 {
+/// Cosine of incidence on the strip beside the silhouette, on the side that is seen.
+fn steepness(views: &[View], outermost: usize, step: usize) -> f64 {
+    const STRIP_M: f64 = 0.05;
     let count = views.len();
-    let step = if is_seen_ahead(views, outermost) {
-        1
-    } else {
-        count - 1
+    let inward = (1..count / 2).map(|k| views[(outermost + k * step) % count]);
+    let from = views[outermost];
+    let cosine = |to: View| {
+        let wide = from.aside_m - to.aside_m;
+        (wide, wide / wide.hypot(from.ahead_m - to.ahead_m).max(1e-9))
     };
+    let mut strip = inward.map(cosine).skip_while(|found| found.0 < STRIP_M);
+    strip.next().map_or(0.0, |found| found.1)
+}
+
+/// Width across the view of the facets beside the silhouette that are seen at a grazing angle.
+fn softness_m(views: &[View], outermost: usize, step: usize) -> f64 {
+    let count = views.len();
     let mut width_m = 0.0;
     let mut a = outermost;
     for _ in 0..count / 2 {

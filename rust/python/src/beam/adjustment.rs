@@ -49,10 +49,10 @@ type Told<'py> = (
 #[pymethods]
 impl BeamAdjustment {
     /// `forces_n` (holds, saddles, 3) in world axes; `rig_prior` and `rig_covariance` of every lidar's
-    /// rotation, translation, elevation, scale and channel offsets.
+    /// rotation, translation, elevation, scale and channel offsets; `clock_s` the deviations of their clocks.
     #[new]
     #[pyo3(signature = (
-        blade, seen, *, spans_ns, forces_n, full_n, poses, channels, rig_prior, rig_covariance, from_m,
+        blade, seen, *, spans_ns, forces_n, full_n, poses, channels, clock_s, rig_prior, rig_covariance, from_m,
         trust, shape_trust, noise_m, surface_m, edge_rad, echoes, threads=None
     ))]
     #[allow(clippy::too_many_arguments)] // keywords of Python
@@ -65,6 +65,7 @@ impl BeamAdjustment {
         full_n: PyReadonlyArray2<'_, f64>,
         poses: PyReadonlyArray3<'_, f64>,
         channels: Vec<usize>,
+        clock_s: Vec<f64>,
         rig_prior: PyReadonlyArray1<'_, f64>,
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
@@ -147,6 +148,7 @@ impl BeamAdjustment {
         let rig = Rig::new(
             poses?,
             channels,
+            clock_s,
             DVector::from_iterator(
                 rig_prior.as_array().len(),
                 rig_prior.as_array().iter().copied(),
