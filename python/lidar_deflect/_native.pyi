@@ -166,6 +166,7 @@ class SweepIterator(Iterator[Sweep]):
         lidars: Sequence[int],
         names: Sequence[str],
         cut_rad: Sequence[float],
+        every: Sequence[int],
         start_ns: int | None = None,
         stop_ns: int | None = None,
         progress: Callable[[int, int], None] | None = None,

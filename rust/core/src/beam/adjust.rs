@@ -34,7 +34,7 @@ const EDGE_EXPECTED_RAD: f64 = 4e-4;
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
 /// Standard deviations of the range errors of a lidar on the blade: what blade and yard differ by, for
 /// they are not equally bright, and what grows with 1 / cos(incidence) - 1; metres.
-pub const RANGE_M: [f64; 2] = [0.001, 0.001];
+pub const RANGE_M: [f64; 2] = [0.002, 0.002];
 
 /// Data are taken for no better than this share of the gate while the gate is wide: they are many, and
 /// what they have in common would bend the loads.

@@ -193,8 +193,8 @@ mod tests {
     use super::*;
 
     const LAST: Gates = Gates {
-        echo_m: 0.1,
-        edge_m: 0.1,
+        echo_m: 0.05,
+        edge_m: 0.05,
         stage: Stage::All,
     };
 

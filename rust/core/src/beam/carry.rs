@@ -238,8 +238,8 @@ mod tests {
     use super::*;
 
     const GATES: Gates = Gates {
-        echo_m: 0.1,
-        edge_m: 0.1,
+        echo_m: 0.05,
+        edge_m: 0.05,
         stage: Stage::All,
     };
     const SPAN_NS: (i64, i64) = (0, 800_000_000);

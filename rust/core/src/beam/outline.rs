@@ -100,8 +100,8 @@ mod tests {
     fn an_outline_surrounds_its_section_and_what_is_seen_is_known_best() {
         let adjustment = sample::adjustment(0.0);
         let gates = Gates {
-            echo_m: 0.1,
-            edge_m: 0.1,
+            echo_m: 0.05,
+            edge_m: 0.05,
             stage: Stage::All,
         };
         let (s_m, count) = (50.0, adjustment.problem.mesh.outline[0].len());
