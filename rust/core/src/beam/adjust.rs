@@ -41,9 +41,6 @@ pub const RANGE_M: [f64; 2] = [0.002, 0.002];
 /// what they have in common would bend the loads.
 const COARSE: f64 = 0.3;
 
-/// Echoes of a hold that bring a blade near which is decimetres away: more say the same.
-const COARSE_ECHOES: usize = 2000;
-
 /// Gate of echoes from which on data count for what they are, metres.
 const FINE_M: f64 = 0.05;
 
@@ -416,14 +413,6 @@ impl Gates {
     /// Whether residuals within them tell of the data, not of a blade that is elsewhere.
     pub fn is_fine(&self) -> bool {
         self.echo_m <= FINE_M
-    }
-
-    /// Echoes of a hold that are worth their time; without a drawing each of them tells of the surface.
-    pub(super) fn echoes(&self, is_vague: bool) -> usize {
-        match self.is_fine() || is_vague {
-            true => usize::MAX,
-            false => COARSE_ECHOES,
-        }
     }
 
     /// Standard deviation below which no echo and no edge is taken to be, metres.

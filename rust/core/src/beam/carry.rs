@@ -316,4 +316,26 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn spreads_are_the_whole_covariance_carried_by_all_slopes() {
+        let holds = sample::adjustment(0.0);
+        let solution = holds.solution(&GATES).unwrap();
+        let (_, knowledge) = holds.knowledge(&[50.0, 55.0], &solution);
+        let posed = holds.posed(0);
+        let (_, rows) = holds.states_at(&knowledge.rests, &posed, 0, TIME_NS);
+        let whole = rows.transpose() * &knowledge.covariance * &rows;
+        let found = knowledge.spreads(&rows);
+        for (k, spread) in found.iter().enumerate() {
+            let expected = whole.fixed_view::<3, 3>(4 * k, 4 * k);
+            assert!((spread.position - expected).amax() < 1e-9 * expected.amax());
+            let twist = whole[(4 * k + 3, 4 * k + 3)];
+            assert!((spread.twist / twist - 1.0).abs() < 1e-9);
+        }
+        // Of a state that is the first hold itself nothing is left but its sway.
+        let still = holds.section_rows(&knowledge.rests).1;
+        for spread in knowledge.spreads(&still) {
+            assert!(spread.deflection.amax() < 1e-9 * spread.position.amax());
+        }
+    }
 }

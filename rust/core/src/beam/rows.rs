@@ -59,8 +59,7 @@ impl<'a> Rows<'a> {
     /// All rows, and what became of the data.
     pub fn collect(mut self) -> (Part, Tally) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let worth = self.gates.echoes(self.adjustment.is_vague());
-        let most = self.adjustment.weights.echoes.min(worth);
+        let most = self.adjustment.weights.echoes;
         let stride = seen.echoes.len().div_ceil(most).max(1);
         let mut hint = None;
         for echo in seen.echoes.iter().step_by(stride) {

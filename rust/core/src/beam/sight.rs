@@ -476,3 +476,38 @@ fn outward(
     // The outline runs round the section in the sense that the hand of the blade gives it.
     (slope.cross(&facet) * mesh.hand).normalize()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn the_facet_beside_the_last_one_is_the_one_that_a_search_of_all_finds() {
+        let adjustment = sample::adjustment(0.0);
+        let (mesh, posed) = (&adjustment.problem.mesh, adjustment.posed(0));
+        let (blade, origin) = (posed.at(0), adjustment.rig.lidar(0).origin);
+        let mut hits = 0;
+        for k in 0..2000 {
+            let even = |step: f64| (f64::from(k) * step).fract() - 0.5;
+            let towards = Vector3::new(5.0 * even(0.618_034), 8.0, 16.0 * even(0.754_878));
+            let direction = towards.normalize();
+            let start_m = blade.nearest_s_m(mesh, &origin, &direction);
+            let Some(hit) = blade.hit(mesh, &origin, &direction, start_m) else {
+                continue;
+            };
+            let section = hit.contact.section;
+            let line = Line {
+                mesh,
+                from: &section.turn.tr_mul(&(origin - section.place)),
+                way: &section.turn.tr_mul(&direction),
+                section: &section,
+            };
+            let (vertex, _, range_m) = line.cross().unwrap();
+            assert_eq!(vertex, hit.contact.vertex);
+            assert!((range_m - hit.range_m).abs() < 1e-9);
+            hits += 1;
+        }
+        assert!(hits > 100, "{hits}");
+    }
+}
