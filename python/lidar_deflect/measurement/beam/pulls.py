@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 ONE = 2.0
 """Largest pull of a single unknown that is no warning."""
-CONTRADICTS = 8.0
+CONTRADICTS = 6.0
 """No luck explains a pull beyond this: it is no warning any more."""
 TOLD = 0.95
 """An unknown whose deviation the data left above this share of what it was tells nothing."""

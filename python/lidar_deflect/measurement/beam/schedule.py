@@ -48,7 +48,7 @@ def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:
 
 
 _LOADS = _stage("loads", (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
-_BLADE = _stage("all", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
+_BLADE = _stage("blade", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
 DRAWN = Schedule((*_LOADS, *_BLADE, *_stage("all", (0.1, 0.1), LAST)), 14)
 """For a blade with a drawing."""
 

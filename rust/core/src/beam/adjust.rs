@@ -88,7 +88,7 @@ pub struct Gates {
 pub enum Stage {
     /// Forces and weight alone: nothing else can bring a blade that is metres away nearer.
     Loads,
-    /// The blade, not yet lidars and surface, or saddles would bend them.
+    /// The blade and where the lidars stand, not yet their ranges and the surface, or saddles would bend them.
     Blade,
     /// Everything.
     All,

@@ -1,12 +1,17 @@
 //! What is known of the unknowns before the data, stage by stage.
 
+use nalgebra::DMatrix;
+
 use super::adjust::{Adjustment, EDGE_OFFSET_RAD, Stage};
 use super::family::Kind;
+use super::layout::RIG;
 use super::normal::Normal;
 use super::weights::let_go;
 
 /// A stress-free curvature known no better than this has to be found with the loads, rad/m.
 const VAGUE_RAD_M: f64 = 1e-4;
+/// Unknowns of a lidar's pose.
+const POSE: usize = 6;
 /// Inverse variance of what is held, against 1 of what is free.
 const HELD: f64 = 1e6;
 /// Edges whose offset keeps less than this share of its weight are let go ...
@@ -92,15 +97,33 @@ impl Adjustment {
         self.tie_clocks(&mut prior);
         if self.free.contains(&rig) {
             let at = rig - self.free.start;
-            let hold = if stage == Stage::All { 1.0 } else { HELD };
-            let pull = &self.rig.information * (&self.rig.prior - &self.rig.values);
-            let information = &self.rig.information * hold;
+            let information = self.rig_information(stage);
+            let pull = &information * (&self.rig.prior - &self.rig.values);
             prior
                 .matrix
                 .view_mut((at, at), (count, count))
                 .copy_from(&information);
-            prior.right.rows_mut(at, count).copy_from(&(pull * hold));
+            prior.right.rows_mut(at, count).copy_from(&pull);
         }
         prior
+    }
+
+    /// What is known of the lidars; while the blade is being found their ranges are held as well, or a beam
+    /// that meets a saddle takes its offset for its own.
+    fn rig_information(&self, stage: Stage) -> DMatrix<f64> {
+        let mut information = self.rig.information.clone();
+        match stage {
+            Stage::Loads => information *= HELD,
+            Stage::Blade => {
+                for lidar in 0..self.layout.channels.len() {
+                    let first = self.layout.lidar_at(lidar) - self.layout.lidar_at(0);
+                    for k in first + POSE..first + RIG + self.layout.channels[lidar] {
+                        information[(k, k)] *= HELD;
+                    }
+                }
+            }
+            Stage::All => {}
+        }
+        information
     }
 }
