@@ -47,6 +47,9 @@ type Told<'py> = (
     Bound<'py, PyDict>,
 );
 
+/// Information and what it asks for.
+type News<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
 #[pymethods]
 impl BeamAdjustment {
     /// `forces_n` (holds, saddles, 3) in world axes; `rig_prior` and `rig_covariance` of every lidar's
@@ -462,10 +465,7 @@ fn spread_rows<'py>(py: Python<'py>, spreads: &[Spread]) -> PyResult<Bound<'py, 
 }
 
 /// Information of the clocks' offsets (lidars, lidars) in 1/s^2, and that times the offsets, 1/s.
-fn clock_news<'py>(
-    py: Python<'py>,
-    news: &ClockNews,
-) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+fn clock_news<'py>(py: Python<'py>, news: &ClockNews) -> PyResult<News<'py>> {
     let rows: Vec<Vec<f64>> = news
         .information
         .row_iter()
