@@ -121,6 +121,27 @@ def test_times_choose_packets_and_all_lidars_come_merged(two: Path) -> None:
         opened.sweeps(start_s=math.nan)
 
 
+def test_one_turn_in_so_many_has_all_of_its_points(two: Path) -> None:
+    opened = capture.open(two)
+    cut_deg = 123.4  # within a packet: some belong to a wanted turn and to one that is not
+    every = {"192.168.1.202:2368": 3}
+    some = list(opened.sweeps(cut_azimuth_deg=cut_deg, every=every))
+    chosen = [
+        sweep
+        for sweep in opened.sweeps(cut_azimuth_deg=cut_deg)
+        if sweep.index % every.get(sweep.lidar, 1) == 0
+    ]
+    assert len(some) == len(chosen) > 20
+    columns = ("xyz", "time_ns", "ring", "range_m", "azimuth_deg", "intensity", "packet", "block")
+    facts = ("lidar", "index", "start_ns", "end_ns", "coverage", "packets", "lost")
+    for one, other in zip(some, chosen, strict=True):
+        assert [getattr(one, name) for name in facts] == [getattr(other, name) for name in facts]
+        for name in columns:
+            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+    with pytest.raises(InvalidValueError, match="every: expected at least 1"):
+        opened.sweeps(every=0)
+
+
 def test_health_counts_by_second_and_lidar(two: Path) -> None:
     health = capture.open(two).health()
     assert set(health["lidar"]) == {"192.168.1.201:2368", "192.168.1.202:2368"}

@@ -166,6 +166,7 @@ class SweepIterator(Iterator[Sweep]):
         lidars: Sequence[int],
         names: Sequence[str],
         cut_rad: Sequence[float],
+        every: Sequence[int],
         start_ns: int | None = None,
         stop_ns: int | None = None,
         progress: Callable[[int, int], None] | None = None,
@@ -426,6 +427,7 @@ class BeamAdjustment:
         full_n: NDArray[np.float64],
         poses: NDArray[np.float64],
         channels: Sequence[int],
+        clock_s: Sequence[float],
         rig_prior: NDArray[np.float64],
         rig_covariance: NDArray[np.float64],
         from_m: float,
@@ -439,6 +441,7 @@ class BeamAdjustment:
     ) -> BeamAdjustment: ...
     def linearise(self) -> None: ...
     def step(self, echo_m: float, edge_m: float, stage: str) -> dict[str, Any]: ...
+    def told(self) -> list[dict[str, Any]]: ...
     def sections(
         self, s_m: Sequence[float], echo_m: float, edge_m: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
@@ -457,6 +460,9 @@ class BeamAdjustment:
         gates: Sequence[tuple[float, float]],
         sway_m: Sequence[float],
     ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]] | None]: ...
+    def set_clocks(
+        self, offset_s: Sequence[float], deviation_s: Sequence[float], tied: bool
+    ) -> None: ...
     def values(self) -> NDArray[np.float64]: ...
     def budget(
         self, s_m: Sequence[float], echo_m: float, edge_m: float

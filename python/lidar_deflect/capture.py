@@ -251,6 +251,7 @@ class Capture:
         start_s: float | None = None,
         stop_s: float | None = None,
         cut_azimuth_deg: float = 0.0,
+        every: int | Mapping[str, int] = 1,
         progress: Progress | None = None,
     ) -> Sweeps:
         """Iterate over the turns of one lidar or several, in the order in which they complete.
@@ -264,6 +265,9 @@ class Capture:
             lidar packet.
         cut_azimuth_deg
             Where one sweep ends and the next begins, in the sensor's own sense of rotation.
+        every
+            One turn in so many, those whose `index` is a multiple of it, for all lidars or by name:
+            the others are followed and not decoded.
         progress
             Called with bytes done and in total.
 
@@ -282,11 +286,22 @@ class Capture:
             If two sensors send under the lidar's name (``capture.same_address``).
         """
         numbers = self.numbers(lidar)
+        turns = [every if isinstance(every, int) else 1] * len(self.streams)
+        if not isinstance(every, int):
+            for name, one_in in every.items():
+                turns[self._number(name)] = one_in
+        if min(turns, default=1) < 1:
+            raise InvalidValueError(
+                f"every: expected at least 1, found {min(turns)}",
+                code="capture.every",
+                hint="1 gives every turn",
+            )
         native = SweepIterator(
             self.native,
             lidars=numbers,
             names=[stream.lidar for stream in self.streams],
             cut_rad=[math.radians(cut_azimuth_deg)] * len(self.streams),
+            every=turns,
             start_ns=self.instant_ns(start_s),
             stop_ns=self.instant_ns(stop_s),
             progress=progress,

@@ -445,6 +445,7 @@ BUDGET_TERMS = {
     "loads": "where and how the load enters",
     "root": "rotation of the root",
     "sway": "sway within the hold",
+    "clocks": "clocks of the lidars against each other",
     "reference": "the unloaded state that the deflection counts from",
     "moment": "noise of this moment alone",
 }

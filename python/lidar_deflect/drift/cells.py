@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,11 +15,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidar_deflect.capture import Sweep
-    from lidar_deflect.drift.echoes import Kept
     from lidar_deflect.measurement.unloaded import HoldCloud
 
     Floats = NDArray[np.float64]
-    Echoes: TypeAlias = HoldCloud | Sweep | Kept
 
 STEP_DEG = 0.5
 """Echoes are added up in azimuth cells of this size, per channel."""
@@ -101,7 +99,8 @@ class Cells:
         cells = cls(plane, ray, start, start, count, normals, offsets, pose)
         for gate_m in (NEAR_M, 0.0):  # about the plane, then about that mean: movers drop out
             sums_ = Sums(cells, wider_m=gate_m)
-            sums_.add(cloud)
+            watched = cells.watches(key)
+            sums_.add(key[watched], cloud.xyz[watched])
             cells = sums_.as_reference()
         return cells._without_rough()
 
@@ -116,30 +115,18 @@ class Cells:
         """How many cells can be watched."""
         return int((self.plane >= 0).sum())
 
-    def watches(self, echoes: Echoes) -> NDArray[np.bool_]:
-        """Tell which echoes fall into a cell that is watched, shape (n,)."""
-        key = keys(echoes)
+    def watches(self, key: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Tell which cells are watched, by their numbers, shape (n,)."""
         inside = key < len(self.plane)
         return np.asarray(inside & (self.plane[np.where(inside, key, 0)] >= 0))
 
-    def away_m(self, echoes: Echoes, pose: Floats) -> tuple[NDArray[np.intp], Floats]:
-        """Cell of every echo that has one, and how far above the reference it lies from `pose`.
-
-        Returns
-        -------
-        tuple
-            Cells, -1 for echoes on none, shape (n,); heights in metres, NaN there.
-        """
-        key = keys(echoes)
-        on = np.flatnonzero(self.watches(echoes))
-        plane = self.plane[key[on]]
+    def away_m(self, cell: NDArray[np.intp], xyz: NDArray[np.float32], pose: Floats) -> Floats:
+        """How far above the reference echoes of watched cells lie, seen from `pose`, metres."""
+        plane = self.plane[cell]
         normal = (self.normals @ pose[:3, :3])[plane]
         beneath = (self.offsets_m - self.normals @ pose[:3, 3])[plane]
-        height = np.einsum("ij,ij->i", echoes.xyz[on], normal) - beneath
-        cell = np.full(len(key), -1, dtype=np.intp)
-        away = np.full(len(key), np.nan)
-        cell[on], away[on] = key[on], height - self.height_m[key[on]]
-        return cell, away
+        height = np.einsum("ij,ij->i", xyz, normal) - beneath
+        return np.asarray(height - self.height_m[cell])
 
     def gate_m(self) -> Floats:
         """How far from its cell's height an echo may lie, shape (cells,)."""
@@ -159,15 +146,15 @@ class Sums:
         self._count = np.zeros(size, dtype=np.intp)
         self._sum, self._squares = np.zeros(size), np.zeros(size)
 
-    def add(self, echoes: Echoes) -> None:
-        """Add the echoes of a sweep or of many."""
+    def add(self, cell: NDArray[np.intp], xyz: NDArray[np.float32]) -> None:
+        """Add echoes of watched cells."""
         size = len(self._cells.plane)
-        key, away = self._cells.away_m(echoes, self._pose)
-        clear = np.abs(away) < self._gate_m[key]  # nothing lies beside NaN
-        key, away = key[clear], away[clear]
-        self._count += np.bincount(key, minlength=size)
-        self._sum += np.bincount(key, away, size)
-        self._squares += np.bincount(key, away * away, size)
+        away = self._cells.away_m(cell, xyz, self._pose)
+        clear = np.abs(away) < self._gate_m[cell]
+        cell, away = cell[clear], away[clear]
+        self._count += np.bincount(cell, minlength=size)
+        self._sum += np.bincount(cell, away, size)
+        self._squares += np.bincount(cell, away * away, size)
 
     def as_reference(self) -> Cells:
         """Return the cells with these heights as those of the reference."""
@@ -202,10 +189,12 @@ def patches(cells: Cells, seen: NDArray[np.intp]) -> NDArray[np.intp]:
     """Tell on which patch each cell lies, by number: roughness is alike within one."""
     place = np.floor(cells.ray_m[seen] / PATCH_M).astype(np.intp)
     patch = np.column_stack([cells.plane[seen], place])
-    return np.asarray(np.unique(patch, axis=0, return_inverse=True)[1], dtype=np.intp).ravel()
+    patch -= patch.min(axis=0)
+    number = np.ravel_multi_index(tuple(patch.T), tuple(patch.max(axis=0) + 1))
+    return np.asarray(np.unique(number, return_inverse=True)[1], dtype=np.intp).ravel()
 
 
-def keys(echoes: Echoes) -> NDArray[np.intp]:
+def keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
     """Cell of every echo: channel, then azimuth."""
     azimuth = np.nan_to_num(echoes.azimuth_deg) / np.float32(STEP_DEG)
     step = np.floor(azimuth).astype(np.intp) % TURN

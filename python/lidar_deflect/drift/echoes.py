@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lidar_deflect.drift.cells import keys
+
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
@@ -25,27 +27,25 @@ class Kept:
 
     Attributes
     ----------
-    xyz, ring, azimuth_deg, time_ns
-        Shapes (n, 3), (n,), (n,), (n,).
+    cell, xyz, time_ns
+        Number of the cell, place in the sensor frame, instant: shapes (n,), (n, 3), (n,).
     """
 
+    cell: NDArray[np.intp]
     xyz: NDArray[np.float32]
-    ring: NDArray[np.uint16]
-    azimuth_deg: NDArray[np.float32]
     time_ns: NDArray[np.int64]
 
     @classmethod
     def of(cls, sweep: Sweep, cells: Cells) -> Kept:
         """Keep the echoes of a sweep that fall into watched cells."""
-        return cls(sweep.xyz, sweep.ring, sweep.azimuth_deg, sweep.time_ns)._where(
-            cells.watches(sweep)
-        )
+        cell = keys(sweep)
+        return cls(cell, sweep.xyz, sweep.time_ns)._where(cells.watches(cell))
 
     @classmethod
     def joined(cls, parts: Sequence[Kept]) -> Kept:
         """Echoes of several sweeps as one, at most `MOST` of them."""
         every = max(1, sum(len(part.time_ns) for part in parts) // MOST)
-        columns = zip(*((p.xyz, p.ring, p.azimuth_deg, p.time_ns) for p in parts), strict=True)
+        columns = zip(*((p.cell, p.xyz, p.time_ns) for p in parts), strict=True)
         return cls(*(np.concatenate(column)[::every] for column in columns))
 
     @classmethod
@@ -59,4 +59,4 @@ class Kept:
         return self._where(self.time_ns >= time_ns)
 
     def _where(self, kept: NDArray[np.bool_]) -> Kept:
-        return Kept(self.xyz[kept], self.ring[kept], self.azimuth_deg[kept], self.time_ns[kept])
+        return Kept(self.cell[kept], self.xyz[kept], self.time_ns[kept])

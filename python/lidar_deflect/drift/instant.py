@@ -50,8 +50,8 @@ def _gains(
     cells: Cells, echoes: Kept, old: Floats, new: Floats
 ) -> tuple[NDArray[np.int64], Floats]:
     """Instants in order, and how much better each echo fits the new pose."""
-    cell, before = cells.away_m(echoes, old)
-    after = cells.away_m(echoes, new)[1]
+    cell = echoes.cell
+    before, after = (cells.away_m(cell, echoes.xyz, pose) for pose in (old, new))
     clear = np.fmin(np.abs(before), np.abs(after)) < cells.gate_m()[cell]
     order = np.argsort(echoes.time_ns[clear], kind="stable")
     scatter = cells.sigma_m[cell[clear]]

@@ -99,7 +99,7 @@ class Standing:
         else:
             self._doubt = None
         if not elsewhere and self._sums is not None:
-            self._sums.add(echoes)
+            self._sums.add(echoes.cell, echoes.xyz)
         step = step_between(self.cells.pose, pose)
         change = Change(step, covariance)
         self.windows.append(Seen(self._lidar, start_ns, stop_ns, change, number))
@@ -139,7 +139,7 @@ class Standing:
         """Pose in a window, and its covariance; None where too little was seen."""
         pose = self.stays[-1].pose
         sums = Sums(self.cells, pose)
-        sums.add(echoes)
+        sums.add(echoes.cell, echoes.xyz)
         change = sums.change()
         if change is not None and not change.moved and sums.seen > SHARE * self.cells.seen:
             return moved_by(pose, change.step), change.covariance
@@ -154,7 +154,7 @@ def found_again(cells: Cells, echoes: Kept, pose: Floats) -> tuple[Floats, Float
     found = None
     for wider in WIDER:
         sums = Sums(cells, pose, wider)
-        sums.add(echoes)
+        sums.add(echoes.cell, echoes.xyz)
         change = sums.change()
         if change is None:
             return None

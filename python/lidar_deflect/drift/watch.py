@@ -80,11 +80,9 @@ class _Window:
         self._edges_ns: list[int] = []
 
     def add(self, sweep: Sweep) -> None:
-        """Add a sweep, if it is one of those that are looked at."""
-        every = max(1, round(WINDOW_NS / SWEEPS / max(1, sweep.end_ns - sweep.start_ns)))
-        if sweep.index % every == 0:
-            self._parts.append(Kept.of(sweep, self._cells))
-            self._edges_ns += [sweep.start_ns, sweep.end_ns]
+        """Add one of the sweeps that are looked at."""
+        self._parts.append(Kept.of(sweep, self._cells))
+        self._edges_ns += [sweep.start_ns, sweep.end_ns]
 
     def close(self, standing: Standing) -> None:
         """Hand over what was seen."""
@@ -157,7 +155,8 @@ def _pass(inputs: Inputs, watched: Mapping[str, Standing]) -> None:
     """Gather the sweeps of every window, and look at it when it is over."""
     start_s, stop_s = _seconds(inputs, (inputs.start_ns, inputs.stop_ns))
     running: dict[str, _Window] = {}
-    for sweep in inputs.capture.sweeps(list(watched), start_s=start_s, stop_s=stop_s):
+    every = {lidar: _one_in(inputs, lidar) for lidar in watched}
+    for sweep in inputs.capture.sweeps(list(watched), start_s=start_s, stop_s=stop_s, every=every):
         lidar, number = sweep.lidar, (sweep.start_ns - inputs.start_ns) // WINDOW_NS
         if lidar not in running or running[lidar].number != number:
             if lidar in running:
@@ -167,6 +166,13 @@ def _pass(inputs: Inputs, watched: Mapping[str, Standing]) -> None:
     for lidar, window in running.items():
         window.close(watched[lidar])
         watched[lidar].finish()
+
+
+def _one_in(inputs: Inputs, lidar: str) -> int:
+    """One sweep in so many makes `SWEEPS` of them in a window."""
+    rpm = next(s.rpm for s in inputs.capture.streams if s.matches(lidar))
+    turn_ns = 60e9 / rpm if rpm else inputs.period_ns
+    return max(1, round(WINDOW_NS / SWEEPS / turn_ns))
 
 
 def _seconds(inputs: Inputs, span_ns: tuple[int, int]) -> tuple[float, float]:

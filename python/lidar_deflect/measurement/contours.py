@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
-BLOCK_FRAMES = 8
+BLOCK_FRAMES = 32
 """Frames that are worked on between two looks at Ctrl-C."""
 
 SAMPLE_S = 5.0

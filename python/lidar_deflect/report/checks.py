@@ -23,7 +23,7 @@ LENGTH_SHARE = 5e-4
 
 _SUM_M = 1e-6
 _STILL_M = 0.005
-_TURN_BACK_RAD = 2e-3
+_TURN_BACK_RAD, _TURN_BACK_SHARE = 2e-3, 0.02
 
 
 @dataclass(frozen=True)
@@ -163,9 +163,10 @@ def _turns(folder: Folder) -> Check | None:
         "back"
     ]
     worst = float(back.max() or 0.0)  # type: ignore[arg-type]
-    limit = f"{1e3 * _TURN_BACK_RAD:g} mrad"
-    found = f"{1e3 * worst:.2f} mrad"
-    return Check(words.CHECKS["monotone"], found, limit, worst <= _TURN_BACK_RAD)
+    whole = float(turn["turn"].max() or 0.0)  # type: ignore[arg-type]
+    limit_rad = max(_TURN_BACK_RAD, _TURN_BACK_SHARE * whole)
+    found, limit = f"{1e3 * worst:.2f} mrad", f"{1e3 * limit_rad:.1f} mrad"
+    return Check(words.CHECKS["monotone"], found, limit, worst <= limit_rad)
 
 
 def flat(value: Any) -> str:

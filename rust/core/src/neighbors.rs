@@ -5,7 +5,7 @@ use kiddo::{ImmutableKdTree, SquaredEuclidean};
 use crate::error::{ClusterError, InvalidValue};
 
 /// Coordinates of a cloud: `f32` as stored or `f64` as computed.
-pub trait Coordinate: Copy + Send + Sync + Into<f64> + 'static {}
+pub trait Coordinate: Copy + PartialOrd + Send + Sync + Into<f64> + 'static {}
 impl Coordinate for f32 {}
 impl Coordinate for f64 {}
 

@@ -11,12 +11,15 @@ pub trait Kernel {
     fn run(self) -> Self::Out;
 }
 
-/// Runs `kernel`, compiled for AVX2 where the machine has it.
+/// Runs `kernel`, compiled for AVX2 and the bit counts that come with it where the machine has them.
 #[inline(always)]
 pub fn vectorized<K: Kernel>(kernel: K) -> K::Out {
     #[cfg(target_arch = "x86_64")]
-    if std::arch::is_x86_feature_detected!("avx2") {
-        // SAFETY: the machine has AVX2, which is all that the function asks for.
+    if std::arch::is_x86_feature_detected!("avx2")
+        && std::arch::is_x86_feature_detected!("bmi1")
+        && std::arch::is_x86_feature_detected!("popcnt")
+    {
+        // SAFETY: the machine has what the function asks for.
         #[allow(unsafe_code)]
         return unsafe { with_avx2(kernel) };
     }
@@ -24,7 +27,7 @@ pub fn vectorized<K: Kernel>(kernel: K) -> K::Out {
 }
 
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
+#[target_feature(enable = "avx2,bmi1,popcnt")]
 fn with_avx2<K: Kernel>(kernel: K) -> K::Out {
     kernel.run()
 }

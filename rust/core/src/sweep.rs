@@ -99,6 +99,16 @@ impl SweepCutter {
         self.lidar
     }
 
+    /// Whether a packet may have returns of a turn whose number is a multiple of `every`.
+    pub fn is_in_turn(&self, packet: &Placed, every: u32) -> bool {
+        let start_rad = self.turns.place(packet);
+        let end_rad = start_rad + packet.head.turned_rad.max(0.0);
+        // Jitter of the encoder may begin a packet before the turn that it is added to.
+        let open = self.open.as_ref().map_or(0, |open| open.turn);
+        let last = Turns::turn_of(end_rad).max(open);
+        (Turns::turn_of(start_rad)..=last).any(|turn| turn.is_multiple_of(every))
+    }
+
     /// Follows the rotor over a packet whose returns are not wanted.
     pub fn skip(&mut self, packet: &Placed) {
         self.turns.follow(packet, self.turns.place(packet));

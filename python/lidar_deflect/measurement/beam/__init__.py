@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.errors import MeasurementError
-from lidar_deflect.measurement.beam import rotation
+from lidar_deflect.measurement.beam import clocks, rotation
 from lidar_deflect.measurement.beam.adjustment import Solved, solve
 from lidar_deflect.measurement.beam.budget import budget_of
 from lidar_deflect.measurement.beam.check import checks, loose_edges, objects
@@ -106,9 +106,10 @@ def measure(inputs: Inputs) -> States:
         u_total_m=uncertainty.total_m[:, of],
         twist_deg=np.degrees(followed.values[:, of, 3]),
         u_twist_deg=np.degrees(uncertainty.twist_rad[:, of]),
-        evidence=_evidence(expected, solved),
+        evidence=_evidence(inputs, expected, solved, followed),
         warnings=[
             *_warnings(solved),
+            *clocks.told(_stand_names(inputs), followed.clocks),
             *loose_edges(inputs, solved),
             *(c.text for c in asked if not c.passed and c.only_warns),
         ],
@@ -224,7 +225,14 @@ def _points(inputs: Inputs, followed: Followed) -> Mapping[str, Any]:
     }
 
 
-def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
+def _stand_names(inputs: Inputs) -> list[str]:
+    return [inputs.lidars[lidar] for lidar in inputs.stands]
+
+
+def _evidence(
+    inputs: Inputs, expected: Expected, solved: Solved, followed: Followed
+) -> Mapping[str, Any]:
+    offsets = zip(followed.clocks.offset_s, followed.clocks.u_s, strict=True)
     holds = [
         {
             "hold": hold.label,
@@ -246,6 +254,10 @@ def _evidence(expected: Expected, solved: Solved) -> Mapping[str, Any]:
         "noise_m": list(solved.told["noise_m"]),
         "surface_m": solved.told["surface_m"],
         "holds": holds,
+        "clocks": [
+            {"lidar": lidar, "offset_ms": 1e3 * float(offset), "u_ms": 1e3 * float(u)}
+            for lidar, (offset, u) in zip(_stand_names(inputs), offsets, strict=True)
+        ],
     }
 
 

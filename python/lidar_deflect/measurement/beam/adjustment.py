@@ -11,9 +11,10 @@ import numpy as np
 from lidar_deflect import _native
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement import paper
+from lidar_deflect.measurement.beam.clocks import unknown
 from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
-from lidar_deflect.measurement.beam.rig import rig_prior
-from lidar_deflect.measurement.beam.schedule import DRAWN, SETTLED, UNDRAWN
+from lidar_deflect.measurement.beam.rig import RigPrior, rig_prior
+from lidar_deflect.measurement.beam.schedule import DRAWN, PATIENCE, SETTLED, UNDRAWN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -61,6 +62,8 @@ class Solved:
         Where the blade's shape began: ``drawing`` or ``generic``.
     plan
         Where the blade is looked for.
+    clocks
+        What holds the clock of each stand of a lidar.
     """
 
     native: _native.BeamAdjustment
@@ -71,6 +74,7 @@ class Solved:
     steps: int
     source: str
     plan: Plan
+    clocks: tuple[str, ...]
 
 
 def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
@@ -129,15 +133,19 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     shares = tuple(shares[i] for i in order)
     drawing = drawing_of(inputs)
     plan = paper.plan_of(inputs)
-    native = _started(inputs, drawing, expected, _seen_in(inputs, plan, spans), spans, shares)
+    rig = rig_prior(inputs)
+    seen = _seen_in(inputs, plan, spans)
+    native = _started(inputs, drawing, rig, expected, seen, spans, shares)
     schedule = UNDRAWN if drawing.source == "generic" else DRAWN
     told, steps = _settle(native, inputs, schedule)
-    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan)
+    clocks = tuple(rig.clocks)
+    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan, clocks)
 
 
 def _started(
     inputs: Inputs,
     drawing: Drawing,
+    rig: RigPrior,
     expected: Expected,
     seen: Sequence[_native.BeamSeen],
     spans: Sequence[tuple[int, int]],
@@ -153,7 +161,6 @@ def _started(
             hint="check [prediction] against the stiffness of the geometry",
         )
     full_n = forces[:, None] * expected.direction
-    rig = rig_prior(inputs)
     return _native.BeamAdjustment(
         drawing.blade,
         seen,
@@ -162,6 +169,7 @@ def _started(
         full_n=full_n,
         poses=rig.poses,
         channels=rig.channels,
+        clock_s=unknown(rig.clocks).tolist(),
         rig_prior=rig.values,
         rig_covariance=rig.covariance,
         from_m=SEEN_SHARE * inputs.config.blade.length_m,
@@ -180,18 +188,21 @@ def _settle(
 ) -> tuple[Mapping[str, Any], int]:
     """Bring the blade nearer stage by stage, then until nothing moves any more."""
     listener = inputs.listener("adjust")
+    stages, steps, tries = len(schedule.first), 0, 0
+    stage, last = 0, stages + schedule.more
     told: dict[str, Any] = {"largest": np.inf}
-    steps = 0
-    while steps < len(schedule.first) or (told["largest"] > SETTLED and steps < schedule.most):
-        told = native.step(*schedule.at(steps))
+    while stage < stages or (told["largest"] > SETTLED and stage < last):
+        told = native.step(*schedule.at(stage))
         with suppress(MeasurementError):  # a step too far is brought back by the next ones
             native.linearise()
-        steps += 1
+        steps, tries = steps + 1, tries + 1
+        if stage >= stages or tries >= PATIENCE or schedule.is_near(stage, told["moved_m"]):
+            stage, tries = stage + 1, 0
         if listener:
-            listener(steps, schedule.most)
+            listener(stage, last)
     if listener:
-        listener(schedule.most, schedule.most)
-    return told | {"holds": [by_lidar(hold, inputs) for hold in told["holds"]]}, steps
+        listener(last, last)
+    return told | {"holds": [by_lidar(hold, inputs) for hold in native.told()]}, steps
 
 
 def by_lidar(told: Mapping[str, Any], inputs: Inputs) -> Mapping[str, Any]:

@@ -41,8 +41,9 @@ SETTLED = 0.5
 """A last step of more than this share of a prior deviation has not settled."""
 STRAIN, STRAIN_DEVIATIONS = 5e-4, 3.0
 """A free axial strain beyond both contradicts a blade that keeps its length."""
-TURN_BACK_RAD = 2e-3
-"""The blade may bend back by so little outboard of the last load."""
+TURN_BACK_RAD, TURN_BACK_SHARE = 2e-3, 0.02
+"""The blade may bend back by so little outboard of the last load, or by this share of its turn: the
+middle of a chord that tapers goes back a little where its axis goes on."""
 OBJECT_M = 1.0
 """Rejected echoes are gathered to objects by so much of the span."""
 MIN_ECHOES = 30
@@ -201,11 +202,12 @@ def _turn(
         slope = np.diff(along) / np.diff(s_m[outside])
         back = np.maximum.accumulate(slope) - slope
         worst = int(np.argmax(back))
+        limit = max(TURN_BACK_RAD, TURN_BACK_SHARE * float(slope.max()))
         yield Check(
             "turns back outboard of the last load",
             f"{1e3 * back[worst]:.2f} mrad",
-            f"{1e3 * TURN_BACK_RAD:g} mrad",
-            bool(back[worst] <= TURN_BACK_RAD),
+            f"{1e3 * limit:.1f} mrad",
+            bool(back[worst] <= limit),
             f"hold {hold.label}, {s_m[outside][worst]:.0f} m",
         )
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lidar_deflect.measurement.beam import clocks
 from lidar_deflect.measurement.beam.adjustment import by_lidar, reading
 from lidar_deflect.measurement.beam.schedule import LAST
 from lidar_deflect.measurement.beam.uncertainty import Spreads
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
     from lidar_deflect._native import BeamSeen
     from lidar_deflect.measurement.beam.adjustment import Solved
+    from lidar_deflect.measurement.beam.clocks import ClockOffsets
     from lidar_deflect.measurement.beam.expected import Expected
     from lidar_deflect.measurement.inputs import Inputs
 
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
 STRETCH_NS = 800_000_000
 """Time that is followed at once ..."""
+LOAD_SHARE = 0.15
+"""Less of it where the load changes by more: what the holds tell is taken between their loads."""
 OVERLAP_NS = 250_000_000
 """... and what of its neighbours helps it."""
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
@@ -57,6 +61,8 @@ class Followed:
         Number of the hold that each moment lies in, shape (t,); -1 between holds.
     points
         Columns of echoes that counted, to look at.
+    clocks
+        Offsets of the clocks of all stands of the lidars.
     """
 
     values: Floats
@@ -64,6 +70,7 @@ class Followed:
     used: NDArray[np.uint32]
     in_hold: NDArray[np.int64]
     points: Mapping[str, Any]
+    clocks: ClockOffsets
 
 
 def follow(
@@ -89,8 +96,11 @@ def follow(
         in_hold[inside] = number
         points.append(told)
     listener = inputs.listener("measure")
-    stretches = _stretches(times_ns, in_hold)
+    loads = expected.at(times_ns)
+    stretches = _stretches(times_ns, in_hold, loads)
     spans = [_span(times_ns, inside) for inside in stretches]
+    moving = clocks.fastest([loads[inside] for inside in stretches])
+    offsets = _clocks(inputs, expected, solved, [spans[place] for place in moving])
     feed = reading(inputs, solved.plan, spans)
     for start in range(0, len(stretches), CHUNK):
         part = stretches[start : start + CHUNK]
@@ -107,19 +117,36 @@ def follow(
             points.append(told)
         if listener:
             listener(start + len(part), len(stretches))
-    return Followed(values, spreads, used, in_hold, _joined(points))
+    return Followed(values, spreads, used, in_hold, _joined(points), offsets)
 
 
-def _stretches(times_ns: Times, in_hold: NDArray[np.int64]) -> list[NDArray[np.intp]]:
-    """Moments between holds, cut into stretches."""
+def _clocks(
+    inputs: Inputs, expected: Expected, solved: Solved, spans: Sequence[tuple[int, int]]
+) -> ClockOffsets:
+    """Find the offsets of the lidars' clocks in some stretches, for all that follow."""
+    kinds, native = solved.clocks, solved.native
+    native.set_clocks([0.0] * len(kinds), clocks.unknown(kinds).tolist(), tied=True)
+    seen = reading(inputs, solved.plan, spans).take(len(spans)) if spans else []
+    found = _between(expected, solved, seen, spans, [np.array([], dtype=np.int64)] * len(spans))
+    news = [result[2]["clocks"] for result in found if result is not None and _fits(result[2])]
+    offsets = clocks.combined(kinds, [one for one in news if one is not None])
+    native.set_clocks(offsets.offset_s.tolist(), offsets.deviation_s.tolist(), tied=False)
+    return offsets
+
+
+def _stretches(
+    times_ns: Times, in_hold: NDArray[np.int64], shares: Floats
+) -> list[NDArray[np.intp]]:
+    """Moments between holds, cut into stretches; `shares` are the loads at all moments."""
     between = np.flatnonzero(in_hold < 0)
     if not between.size:
         return []
     breaks = [0]
     for place in range(1, len(between)):
         goes_on = between[place] == between[place - 1] + 1
-        length = times_ns[between[place]] - times_ns[between[breaks[-1]]]
-        if not goes_on or length >= STRETCH_NS:
+        now, start = between[place], between[breaks[-1]]
+        is_long = times_ns[now] - times_ns[start] >= STRETCH_NS
+        if not goes_on or is_long or abs(shares[now] - shares[start]) > LOAD_SHARE:
             breaks.append(place)
     return np.split(between, breaks[1:])
 

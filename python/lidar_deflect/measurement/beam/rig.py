@@ -36,12 +36,15 @@ class RigPrior:
         Shape (n, 4, 4).
     channels
         Channels of each lidar.
+    clocks
+        What holds each lidar's clock: ``locked``, ``utc`` or ``free_running``.
     values, covariance
         Per lidar rotation (rad), translation (m), elevation (rad), range scale, offsets (m).
     """
 
     poses: Floats
     channels: list[int]
+    clocks: list[str]
     values: Floats
     covariance: Floats
 
@@ -55,10 +58,16 @@ def rig_prior(inputs: Inputs) -> RigPrior:
     joint: Any = getattr(inputs.calibration, "joint", None)
     if joint is not None:
         _take_joint(joint, inputs.lidars, channels, values, covariance)
-    known = RigPrior(
-        np.array([pose.world_from_sensor for pose in poses]), channels, values, covariance
-    )
+    clocks = clock_kinds(inputs)
+    placed = np.array([pose.world_from_sensor for pose in poses])
+    known = RigPrior(placed, channels, clocks, values, covariance)
     return _with_moves(known, inputs) if inputs.moves else known
+
+
+def clock_kinds(inputs: Inputs) -> list[str]:
+    """Tell what holds the clock of each lidar."""
+    numbers = inputs.capture.numbers(inputs.lidars)
+    return [inputs.capture.streams[number].clock_kind for number in numbers]
 
 
 def _with_moves(known: RigPrior, inputs: Inputs) -> RigPrior:
@@ -72,7 +81,8 @@ def _with_moves(known: RigPrior, inputs: Inputs) -> RigPrior:
         own = slice(start, start + 6)
         covariance[own, own] += move.covariance
     poses = [*known.poses, *(move.world_from_sensor for move in inputs.moves)]
-    return RigPrior(np.array(poses), channels, known.values[same], covariance)
+    clocks = [known.clocks[lidar] for lidar in inputs.stands]
+    return RigPrior(np.array(poses), channels, clocks, known.values[same], covariance)
 
 
 def _channels(inputs: Inputs, lidar: str) -> int:

@@ -13,30 +13,46 @@ SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
 
 
+NEAR = 0.3
+"""A blade that still moves by more than this share of the next gate is not yet within it ..."""
+PATIENCE = 8
+"""... and so many steps are taken before the gate closes all the same."""
+
+
 @dataclass(frozen=True)
 class Schedule:
-    """Steps that are always taken, and how many at the most until nothing moves any more."""
+    """Gates that close one after the other as the blade comes to rest, then steps with the last.
+
+    Attributes
+    ----------
+    first
+        With what steps are taken, in this order.
+    more
+        How many steps may follow with the last gates until nothing moves any more.
+    """
 
     first: tuple[Step, ...]
-    most: int
+    more: int
 
-    def at(self, step: int) -> Step:
-        """Return what a step is taken with; `step` counts from 0."""
-        return self.first[step] if step < len(self.first) else (*LAST, "all")
+    def at(self, stage: int) -> Step:
+        """Return what a step is taken with; `stage` counts from 0."""
+        return self.first[stage] if stage < len(self.first) else (*LAST, "all")
+
+    def is_near(self, stage: int, moved_m: float) -> bool:
+        """Whether a blade that moved so far in a step can go on to the next stage."""
+        return moved_m < NEAR * self.at(stage + 1)[0]
 
 
 def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:
     return tuple((echo_m, edge_m, name) for echo_m, edge_m in gates_m)
 
 
-_LOADS = _stage("loads", (3.0, 2.0), (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
-_BLADE = _stage("blade", *[(1.0, 1.0)] * 2, *[(0.6, 0.6)] * 2, *[(0.3, 0.4)] * 2, (0.2, 0.2))
-_DRAWN = (*_LOADS, *_BLADE, *_stage("all", (0.1, 0.1), *[LAST] * 3))
-DRAWN = Schedule(_DRAWN, len(_DRAWN) + 12)
+_LOADS = _stage("loads", (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
+_BLADE = _stage("all", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
+DRAWN = Schedule((*_LOADS, *_BLADE, *_stage("all", (0.1, 0.1), LAST)), 14)
 """For a blade with a drawing."""
 
 _FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
 _NEAR = [*[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8]
-_UNDRAWN = (*_FAR, *_LOADS, *_stage("all", *_NEAR))
-UNDRAWN = Schedule(_UNDRAWN, len(_UNDRAWN) + 40)
+UNDRAWN = Schedule((*_FAR, *_LOADS, *_stage("all", *_NEAR)), 40)
 """Where no drawing tells prebend and surface: a blade alone would bend to fit the surface."""

@@ -1,11 +1,13 @@
 //! One adjustment of all holds: states, surface, lidars and edges from rays, edges and what is known.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DVector, Vector3};
 use rayon::prelude::*;
 
 use super::axis::Axis;
+use super::clocks::Clocks;
 use super::echoes::Seen;
 use super::equilibrium::Physics;
 use super::family::{self, Kind, Loading, Response, Trust, Unknown};
@@ -16,6 +18,7 @@ use super::posed::{Posed, knots};
 use super::rig::{Lidar, Rig};
 use super::rows::Rows;
 use super::shape::Shape;
+use super::sums::Part;
 use super::track::zeros;
 use super::weights::{Tally, Weights};
 use crate::error::BeamError;
@@ -32,16 +35,20 @@ const EDGE_EXPECTED_RAD: f64 = 4e-4;
 pub const EDGE_OFFSET_RAD: f64 = 1e-4;
 /// Standard deviations of the range errors of a lidar on the blade: what blade and yard differ by, for
 /// they are not equally bright, and what grows with 1 / cos(incidence) - 1; metres.
-pub const RANGE_M: [f64; 2] = [0.001, 0.001];
+pub const RANGE_M: [f64; 2] = [0.002, 0.002];
 
-/// Data are taken for no better than this share of the gate while the gate is wide.
-const COARSE: f64 = 0.1;
+/// Data are taken for no better than this share of the gate while the gate is wide: they are many, and
+/// what they have in common would bend the loads.
+const COARSE: f64 = 0.3;
+
+/// Gate of echoes from which on data count for what they are, metres.
+const FINE_M: f64 = 0.05;
 
 /// A hold as it enters the adjustment.
 #[derive(Debug, Clone)]
 pub struct Hold {
     /// What was seen in it.
-    pub seen: Seen,
+    pub seen: Arc<Seen>,
     /// First and last instant, nanoseconds.
     pub span_ns: (i64, i64),
     /// Loads as they are thought to be.
@@ -120,6 +127,10 @@ pub struct Adjustment {
     pub(super) knot_ns: i64,
     /// Whether the first mode in time is the load.
     pub(super) follows_load: bool,
+    /// What is known of the clocks in stretches between holds, where that is more than in them.
+    pub clocks: Option<Clocks>,
+    /// Whether the mean of the clocks is held.
+    pub(super) ties_clocks: bool,
     /// Lidars and sides whose edges do not count.
     pub(super) muted: Vec<(usize, usize)>,
     pub(super) shared: Vec<Unknown>,
@@ -158,6 +169,8 @@ impl Adjustment {
             knot_ns: KNOT_NS,
             follows_load: false,
             muted: Vec::new(),
+            clocks: None,
+            ties_clocks: false,
             layout,
             rig,
             weights,
@@ -221,15 +234,19 @@ impl Adjustment {
         at: &Axis,
         shared: &[Response],
     ) -> Option<Vec<Response>> {
-        let respond = |unknown: &Unknown| {
-            let same = self.shared.iter().position(|s| s.kind == unknown.kind);
-            if let Some(place) = same.filter(|_| matches!(unknown.kind, Kind::Soft { .. })) {
-                let scale = unknown.sigma / self.shared[place].sigma;
-                return Some(shared[place].scaled(scale));
-            }
-            family::responses(&self.problem.mesh, physics, at, &[*unknown])?.pop()
+        let same = |unknown: &Unknown| {
+            let is_stiffness = matches!(unknown.kind, Kind::Soft { .. });
+            let place = self.shared.iter().position(|s| s.kind == unknown.kind);
+            place.filter(|_| is_stiffness)
         };
-        self.own[hold].iter().map(respond).collect()
+        let own = &self.own[hold];
+        let new: Vec<Unknown> = own.iter().filter(|u| same(u).is_none()).copied().collect();
+        let mut found = family::responses(&self.problem.mesh, physics, at, &new)?.into_iter();
+        let respond = |unknown: &Unknown| match same(unknown) {
+            Some(place) => Some(shared[place].scaled(unknown.sigma / self.shared[place].sigma)),
+            None => found.next(),
+        };
+        own.iter().map(respond).collect()
     }
 
     /// Everything that bends the blade in a hold, as estimated so far.
@@ -276,6 +293,7 @@ impl Adjustment {
             free: self.free.clone(),
             modes_m: self.modes_m.clone(),
             muted: self.muted.clone(),
+            clocks: None,
             shared: self.shared.clone(),
             own: self.own.clone(),
             drawn: self.drawn.clone(),
@@ -300,6 +318,11 @@ impl Adjustment {
         self.problem.mesh = self.problem.shape.built(&self.drawn, values.as_slice());
     }
 
+    /// What the clock of a lidar is behind the one that all share, seconds.
+    pub fn clock_s(&self, lidar: usize) -> f64 {
+        self.values[self.layout.clock_at(lidar)] * self.rig.clock_s[lidar]
+    }
+
     /// Shared and own unknowns of a hold.
     fn state(&self, hold: usize) -> DVector<f64> {
         let own = self
@@ -318,8 +341,20 @@ impl Adjustment {
             .collect()
     }
 
-    /// The blade of a hold as estimated so far.
-    pub fn posed(&self, hold: usize) -> Posed {
+    /// Unknowns that data of a hold tell of beside those of its state.
+    pub(super) fn touched_at(&self, hold: usize) -> impl Iterator<Item = usize> {
+        let layout = &self.layout;
+        let sway = layout.sway_at(hold)..layout.sway_at(hold + 1);
+        let edges = layout.edge_offset_at(hold, 0, 0)..layout.edge_offset_at(hold + 1, 0, 0);
+        let strain = layout.len() + hold;
+        sway.chain(layout.clock_at(0)..layout.edge_at() + 1)
+            .chain(edges)
+            .chain(layout.range_at(0)..layout.len())
+            .chain([strain])
+    }
+
+    /// The axis of a hold without sway, by the slopes of the last equilibrium.
+    pub(super) fn still(&self, hold: usize) -> Axis {
         let (linear, problem) = (&self.linear[hold], &self.problem);
         let change = self.state(hold) - &linear.values;
         let mut curvature = linear.curvature.clone();
@@ -332,7 +367,13 @@ impl Adjustment {
             root += response.root_rad * *amount;
         }
         let turn = nalgebra::Rotation3::from_scaled_axis(root).matrix() * problem.mesh.root;
-        let still = Axis::integrate(&turn, &problem.mesh.s_m, curvature);
+        Axis::integrate(&turn, &problem.mesh.s_m, curvature)
+    }
+
+    /// The blade of a hold as estimated so far.
+    pub fn posed(&self, hold: usize) -> Posed {
+        let (linear, problem) = (&self.linear[hold], &self.problem);
+        let still = self.still(hold);
         let at = self.layout.sway_at(hold);
         let coefficients: Vec<f64> = (0..self.layout.modes * self.layout.knots[hold])
             .map(|k| self.values[at + k] * self.modes_m[k / self.layout.knots[hold]])
@@ -354,14 +395,14 @@ impl Adjustment {
         let lidars: Vec<Lidar> = (0..self.rig.poses.len())
             .map(|l| self.rig.lidar(l))
             .collect();
-        let parts: Vec<(Normal, Tally)> = (0..self.problem.holds.len())
+        let parts: Vec<(Part, Tally)> = (0..self.problem.holds.len())
             .into_par_iter()
             .map(|hold| Rows::new(self, hold, &lidars, gates).collect())
             .collect();
         let mut sum = self.prior(gates.stage);
         let mut tallies = Vec::new();
-        for (normal, tally) in parts {
-            sum.join(&normal);
+        for (part, tally) in parts {
+            sum.join(&part);
             tallies.push(tally);
         }
         (sum, tallies)
@@ -369,11 +410,16 @@ impl Adjustment {
 }
 
 impl Gates {
+    /// Whether residuals within them tell of the data, not of a blade that is elsewhere.
+    pub fn is_fine(&self) -> bool {
+        self.echo_m <= FINE_M
+    }
+
     /// Standard deviation below which no echo and no edge is taken to be, metres.
     pub fn coarse_m(&self) -> [f64; 2] {
-        match self.stage {
-            Stage::All => [0.0; 2],
-            _ => [COARSE * self.echo_m, COARSE * self.edge_m],
+        match self.is_fine() {
+            true => [0.0; 2],
+            false => [COARSE * self.echo_m, COARSE * self.edge_m],
         }
     }
 }

@@ -46,6 +46,12 @@ impl Axis {
         }
     }
 
+    /// Largest distance between nodes of two shapes of one blade, metres.
+    pub fn farthest_m(&self, other: &Self) -> f64 {
+        let apart = self.place.iter().zip(&other.place);
+        apart.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    }
+
     /// What a change of curvature (each element, its own directions) and of the root's rotation
     /// (world) moves.
     pub fn field(&self, s_m: &[f64], change: &[Vector3<f64>], root_turn: &Vector3<f64>) -> Field {

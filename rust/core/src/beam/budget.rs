@@ -2,21 +2,24 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
 use super::adjust::{Adjustment, Gates};
+use super::factor::Factor;
 use super::family::Kind;
 use super::layout::RIG;
 use super::normal::Normal;
 use super::rig::Lidar;
 use super::rows::Rows;
+use super::solution::Solution;
+use super::sums::Part;
 use crate::error::BeamError;
 
 /// Values of a section of a hold: x, y, z, their changes and that of the whole, twist.
 pub const VALUES: usize = 8;
 /// Names of the groups, in the order of a budget.
-pub const GROUPS: [&str; 11] = [
+pub const GROUPS: [&str; 12] = [
     "range_noise",
     "edge_steps",
     "registration",
@@ -28,9 +31,8 @@ pub const GROUPS: [&str; 11] = [
     "loads",
     "root",
     "sway",
+    "clocks",
 ];
-/// A strain is known beforehand no better than this.
-const STRAIN: f64 = 0.1;
 /// Weights of a change of no length have no direction: below this it has none, metres.
 const STILL_M: f64 = 1e-9;
 
@@ -46,21 +48,18 @@ impl Adjustment {
     ///
     /// An estimate is the sum of gains times independent sources; a source of information `W` gives
     /// `v^T W v` to the variance of a value, with `v` its slopes solved by the normal matrix.
-    ///
-    /// # Errors
-    /// [`BeamError::Singular`].
-    pub fn budget(&self, s_m: &[f64], gates: &Gates) -> Result<Budget, BeamError> {
-        let rows = self.value_rows(s_m);
-        let whole = self.normal(gates).0;
+    pub fn budget(&self, s_m: &[f64], solution: &Solution) -> Budget {
+        let (rows, gates) = (self.value_rows(s_m), &solution.gates);
         let edges = mirrored(self.edges(gates));
         let prior = mirrored(self.prior(gates.stage));
-        let all = mirrored(whole.clone());
-        let (_, factor) = whole.solve().ok_or(BeamError::Singular)?;
-        let solved = factor.solve(&rows);
+        let solved = &solution.covariance * &rows;
         let of_edges = shares(&edges, &solved);
         let of_prior = &prior * &solved;
         let mut groups = vec![vec![0.0; rows.ncols()]; GROUPS.len()];
-        for (column, total) in sums(&shares(&all, &solved)).into_iter().enumerate() {
+        for (column, total) in sums(&shares(&solution.matrix, &solved))
+            .into_iter()
+            .enumerate()
+        {
             let step = of_edges.column(column).sum();
             groups[1][column] = step;
             groups[0][column] = total - step;
@@ -72,20 +71,22 @@ impl Adjustment {
                 groups[0][column] -= part;
             }
         }
-        Ok(Budget {
+        Budget {
             groups: GROUPS.into_iter().zip(groups).collect(),
-        })
+        }
     }
 
     /// By unknown: name of its group, change by the data, standard deviation before and after them.
     ///
     /// # Errors
     /// [`BeamError::Singular`].
-    pub fn posterior(&self, gates: &Gates) -> Result<Vec<(&'static str, [f64; 3])>, BeamError> {
-        let prior = mirrored(self.prior(gates.stage));
-        let before = prior.cholesky().ok_or(BeamError::Singular)?.inverse();
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let after = factor.inverse();
+    pub fn posterior(
+        &self,
+        solution: &Solution,
+    ) -> Result<Vec<(&'static str, [f64; 3])>, BeamError> {
+        let prior = self.prior(solution.gates.stage).matrix;
+        let before = Factor::new(prior).ok_or(BeamError::Singular)?.inverse();
+        let after = &solution.covariance;
         let mut known = vec![("", [0.0; 3]); self.layout.len()];
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
         for (group, unknowns) in self.sources() {
@@ -100,30 +101,6 @@ impl Adjustment {
             }
         }
         Ok(known)
-    }
-
-    /// Axial strain of each hold, fitted beside all else as if the blade did not keep its length, with
-    /// the joint covariance: a check, for a blade stretches by less than a ten thousandth.
-    ///
-    /// # Errors
-    /// [`BeamError::Singular`].
-    pub fn strains(&self, gates: &Gates) -> Result<(DVector<f64>, DMatrix<f64>), BeamError> {
-        let (count, holds) = (self.layout.len(), self.problem.holds.len());
-        let mut wide = self.clone();
-        wide.free = 0..count + holds;
-        wide.values = wide.values.resize_vertically(count + holds, 0.0);
-        wide.expected = wide.expected.resize_vertically(count + holds, 0.0);
-        wide.tightness = wide
-            .tightness
-            .resize_vertically(count + holds, 1.0 / (STRAIN * STRAIN));
-        let (step, factor) = wide.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let mut pick = DMatrix::zeros(count + holds, holds);
-        (0..holds).for_each(|hold| pick[(count + hold, hold)] = 1.0);
-        let spread = factor.solve(&pick);
-        Ok((
-            step.rows(count, holds).into_owned(),
-            spread.rows(count, holds).into_owned(),
-        ))
     }
 
     /// Slopes of all values of all sections by all unknowns.
@@ -152,7 +129,7 @@ impl Adjustment {
             .map(|l| self.rig.lidar(l))
             .collect();
         let of = |hold| Rows::new(self, hold, &lidars, gates).of_edges();
-        let parts: Vec<Normal> = (0..self.problem.holds.len())
+        let parts: Vec<Part> = (0..self.problem.holds.len())
             .into_par_iter()
             .map(of)
             .collect();
@@ -169,7 +146,8 @@ impl Adjustment {
         for (i, unknown) in self.shared.iter().chain(own).enumerate() {
             groups.push((group_of(unknown.kind), i..i + 1));
         }
-        groups.push((10, layout.sway_at(0)..layout.lidar_at(0)));
+        groups.push((10, layout.sway_at(0)..layout.clock_at(0)));
+        groups.push((11, layout.clock_at(0)..layout.lidar_at(0)));
         for (lidar, channels) in layout.channels.iter().enumerate() {
             let first = layout.lidar_at(lidar);
             groups.push((2, first..first + 6));
@@ -215,8 +193,8 @@ mod tests {
     use super::*;
 
     const LAST: Gates = Gates {
-        echo_m: 0.1,
-        edge_m: 0.1,
+        echo_m: 0.05,
+        edge_m: 0.05,
         stage: Stage::All,
     };
 
@@ -224,8 +202,9 @@ mod tests {
     fn the_parts_of_a_budget_sum_to_the_variance() {
         let adjustment = sample::adjustment(0.0);
         let s_m = [40.0, 55.0];
-        let whole = adjustment.knowledge(&s_m, &LAST).unwrap().0.covariance;
-        let budget = adjustment.budget(&s_m, &LAST).unwrap();
+        let solution = adjustment.solution(&LAST).unwrap();
+        let whole = adjustment.knowledge(&s_m, &solution).0.covariance;
+        let budget = adjustment.budget(&s_m, &solution);
         for (section, column) in [(0, 0), (0, 2), (1, 1)] {
             let place = VALUES * section + column;
             let sum: f64 = budget.groups.iter().map(|group| group.1[place]).sum();
@@ -239,8 +218,10 @@ mod tests {
     #[test]
     fn more_noise_is_a_larger_part_of_noise_and_no_larger_part_of_the_prior() {
         let mut adjustment = sample::adjustment(0.0);
-        let part =
-            |a: &Adjustment, group: usize| a.budget(&[55.0], &LAST).unwrap().groups[group].1[1];
+        let part = |a: &Adjustment, group: usize| {
+            let solution = a.solution(&LAST).unwrap();
+            a.budget(&[55.0], &solution).groups[group].1[1]
+        };
         let before = part(&adjustment, 0);
         adjustment.weights.noise_m = vec![0.02];
         assert!(part(&adjustment, 0) > before);
@@ -248,7 +229,9 @@ mod tests {
 
     #[test]
     fn data_narrow_what_was_known_and_never_widen_it() {
-        let known = sample::adjustment(0.0).posterior(&LAST).unwrap();
+        let adjustment = sample::adjustment(0.0);
+        let solution = adjustment.solution(&LAST).unwrap();
+        let known = adjustment.posterior(&solution).unwrap();
         assert!(known.iter().all(|(name, _)| GROUPS.contains(name)));
         for (name, [_, before, after]) in &known {
             assert!(
@@ -263,13 +246,13 @@ mod tests {
     #[test]
     fn a_blade_that_keeps_its_length_has_no_strain_and_a_stretched_one_has() {
         let mut adjustment = sample::adjustment(0.0);
-        let (strain, covariance) = adjustment.strains(&LAST).unwrap();
-        let deviation = covariance[(0, 0)].sqrt();
-        assert!(strain[0].abs() < 3.0 * deviation, "{strain} of {deviation}");
+        let found = adjustment.solution(&LAST).unwrap();
+        let (strain, deviation) = (found.strain[0], found.strain_covariance[(0, 0)].sqrt());
+        assert!(strain.abs() < 3.0 * deviation, "{strain} of {deviation}");
         // The lidar is held and the blade is seen 40 mm nearer to the root than it stands.
         adjustment.rig.values[5] -= 0.04;
         adjustment.rig.prior[5] -= 0.04;
-        let (moved, _) = adjustment.strains(&LAST).unwrap();
-        assert!(moved[0] < strain[0], "{moved} after {strain}");
+        let moved = adjustment.solution(&LAST).unwrap().strain[0];
+        assert!(moved < strain, "{moved} after {strain}");
     }
 }

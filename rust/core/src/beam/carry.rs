@@ -3,11 +3,11 @@
 
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3};
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::Adjustment;
 use super::layout::RANGES;
 use super::posed::Posed;
 use super::sections::{Rests, Sections};
-use crate::error::BeamError;
+use super::solution::Solution;
 
 /// What an adjustment knows of its unknowns, and of the sections in its first hold.
 #[derive(Debug, Clone)]
@@ -16,9 +16,10 @@ pub struct Knowledge {
     pub rests: Rests,
     /// Covariance of all unknowns.
     covariance: DMatrix<f64>,
-    /// How all unknowns move x, y, z of the sections in the first hold, and the covariance times that.
-    rest: DMatrix<f64>,
+    /// Covariance of all unknowns with x, y, z of the sections in the first hold, ...
     rest_carried: DMatrix<f64>,
+    /// ... and that of x, y, z of each section by itself.
+    rest_own: Vec<Matrix3<f64>>,
 }
 
 /// Variances of one section at one instant.
@@ -35,24 +36,37 @@ pub struct Spread {
 impl Knowledge {
     /// Spreads by slopes of x, y, z and twist of the first sections.
     fn spreads(&self, rows: &DMatrix<f64>) -> Vec<Spread> {
-        let carried = &self.covariance * rows;
-        let crossed = |k: usize| {
-            let rest = self.rest_carried.columns(3 * k, 3);
-            let cross = rows.columns(4 * k, 3).tr_mul(&rest);
-            let own = self.rest.columns(3 * k, 3).tr_mul(&rest);
-            (matrix(&cross), matrix(&own))
-        };
+        // Few unknowns move a single state: the others have no part in its spread.
+        let touched = touched(rows);
+        let rows = rows.select_rows(&touched);
+        let known = self
+            .covariance
+            .select_columns(&touched)
+            .select_rows(&touched);
+        let (carried, rest) = (known * &rows, self.rest_carried.select_rows(&touched));
         let of = |k: usize| {
-            let block = rows.columns(4 * k, 4).tr_mul(&carried.columns(4 * k, 4));
-            let (position, (cross, own)) = (matrix(&block), crossed(k));
+            let own = rows.columns(4 * k, 4);
+            let block = own.tr_mul(&carried.columns(4 * k, 4));
+            let cross = matrix(&own.tr_mul(&rest.columns(3 * k, 3)));
+            let position = matrix(&block);
             Spread {
                 position,
-                deflection: position + own - cross - cross.transpose(),
+                deflection: position + self.rest_own[k] - cross - cross.transpose(),
                 twist: block[(3, 3)],
             }
         };
         (0..rows.ncols() / 4).map(of).collect()
     }
+}
+
+/// Rows that are not zero.
+fn touched(rows: &DMatrix<f64>) -> Vec<usize> {
+    let mut is_touched = vec![false; rows.nrows()];
+    for column in rows.column_iter() {
+        let entries = is_touched.iter_mut().zip(column.iter());
+        entries.for_each(|(is_one, slope)| *is_one |= *slope != 0.0);
+    }
+    (0..rows.nrows()).filter(|row| is_touched[*row]).collect()
 }
 
 /// The first three rows and columns.
@@ -73,28 +87,25 @@ impl Spread {
 
 impl Adjustment {
     /// The sections at `s_m` of all holds, and what states of single instants need.
-    ///
-    /// # Errors
-    /// [`BeamError::Singular`].
-    pub fn knowledge(
-        &self,
-        s_m: &[f64],
-        gates: &Gates,
-    ) -> Result<(Sections, Knowledge), BeamError> {
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let covariance = factor.inverse();
+    pub fn knowledge(&self, s_m: &[f64], solution: &Solution) -> (Sections, Knowledge) {
+        let covariance = solution.covariance.clone();
         let rests = self.rests(s_m);
         let (values, rows) = self.section_rows(&rests);
         let carried = &covariance * &rows;
         let columns: Vec<usize> = (0..3 * s_m.len()).map(|k| 4 * (k / 3) + k % 3).collect();
+        let rest_carried = carried.select_columns(&columns);
+        let own = |k: usize| {
+            let at = rows.columns(4 * k, 3);
+            matrix(&at.tr_mul(&rest_carried.columns(3 * k, 3)))
+        };
         let knowledge = Knowledge {
+            rest_own: (0..s_m.len()).map(own).collect(),
             rests,
-            rest: rows.select_columns(&columns),
-            rest_carried: carried.select_columns(&columns),
+            rest_carried,
             covariance,
         };
-        let covariance = rows.tr_mul(&carried);
-        Ok((Sections { values, covariance }, knowledge))
+        let covariance = rows.transpose() * &carried;
+        (Sections { values, covariance }, knowledge)
     }
 
     /// States of a hold at instants, by instant and section: x, y, z and twist, and how well they are
@@ -221,14 +232,14 @@ impl Adjustment {
 
 #[cfg(test)]
 mod tests {
-    use super::super::adjust::Stage;
+    use super::super::adjust::{Gates, Stage};
     use super::super::sample;
     use super::super::track::{Stretch, load_knots};
     use super::*;
 
     const GATES: Gates = Gates {
-        echo_m: 0.1,
-        edge_m: 0.1,
+        echo_m: 0.05,
+        edge_m: 0.05,
         stage: Stage::All,
     };
     const SPAN_NS: (i64, i64) = (0, 800_000_000);
@@ -278,7 +289,8 @@ mod tests {
     #[test]
     fn a_state_between_holds_answers_to_what_they_told_as_its_slopes_say() {
         let holds = sample::adjustment(0.0);
-        let (_, knowledge) = holds.knowledge(&[55.0], &GATES).unwrap();
+        let solution = holds.solution(&GATES).unwrap();
+        let (_, knowledge) = holds.knowledge(&[55.0], &solution);
         let layout = &holds.layout;
         let rig = layout.lidar_at(0);
         // A force, the lidar's place.
@@ -302,6 +314,28 @@ mod tests {
                     with[(axis, axis)]
                 );
             }
+        }
+    }
+
+    #[test]
+    fn spreads_are_the_whole_covariance_carried_by_all_slopes() {
+        let holds = sample::adjustment(0.0);
+        let solution = holds.solution(&GATES).unwrap();
+        let (_, knowledge) = holds.knowledge(&[50.0, 55.0], &solution);
+        let posed = holds.posed(0);
+        let (_, rows) = holds.states_at(&knowledge.rests, &posed, 0, TIME_NS);
+        let whole = rows.transpose() * &knowledge.covariance * &rows;
+        let found = knowledge.spreads(&rows);
+        for (k, spread) in found.iter().enumerate() {
+            let expected = whole.fixed_view::<3, 3>(4 * k, 4 * k);
+            assert!((spread.position - expected).amax() < 1e-9 * expected.amax());
+            let twist = whole[(4 * k + 3, 4 * k + 3)];
+            assert!((spread.twist / twist - 1.0).abs() < 1e-9);
+        }
+        // Of a state that is the first hold itself nothing is left but its sway.
+        let still = holds.section_rows(&knowledge.rests).1;
+        for spread in knowledge.spreads(&still) {
+            assert!(spread.deflection.amax() < 1e-9 * spread.position.amax());
         }
     }
 }

@@ -34,10 +34,15 @@ impl Layout {
         self.own_at(self.own.len()) + before * self.modes
     }
 
+    /// The offset of a lidar's clock.
+    pub fn clock_at(&self, lidar: usize) -> usize {
+        self.sway_at(self.knots.len()) + lidar
+    }
+
     /// First unknown of a lidar: rotation, translation, elevation, scale, channels.
     pub fn lidar_at(&self, lidar: usize) -> usize {
         let before: usize = self.channels[..lidar].iter().map(|c| c + RIG).sum();
-        self.sway_at(self.knots.len()) + before
+        self.clock_at(self.channels.len()) + before
     }
 
     /// Number of unknowns of all lidars.

@@ -1,6 +1,6 @@
 //! The beam method: a blade that bends as blades bend, fitted to rays and edges of all lidars.
 //!
-//! [`design`] and [`mesh`] hold the drawing, [`equilibrium`] and [`family`] say which states it can
+//! [`design`] and [`mesh`] hold the drawing, [`equilibrium`], [`tangent`] and [`family`] say which states it can
 //! have, [`axis`] keeps its length, [`sight`] meets it with rays and scan planes, [`adjust`] puts
 //! everything into one adjustment, [`common`] says what neighbouring data share, [`track`] follows the blade between
 //! holds and [`carry`] tells how well each instant is known. Source: docs/method.md.
@@ -9,16 +9,19 @@ pub mod adjust;
 pub mod axis;
 pub mod budget;
 pub mod carry;
+pub mod clocks;
 pub mod common;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;
+pub mod factor;
 pub mod family;
 pub mod gather;
 pub mod layout;
 pub mod mesh;
 pub mod normal;
 pub mod outline;
+pub mod panel;
 pub mod posed;
 mod prior;
 pub mod rig;
@@ -28,8 +31,11 @@ mod sample;
 pub mod sections;
 pub mod shape;
 pub mod sight;
+pub mod solution;
 pub mod start;
 pub mod step;
+pub mod sums;
 mod table;
+pub mod tangent;
 pub mod track;
 pub mod weights;

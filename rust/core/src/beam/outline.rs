@@ -2,19 +2,16 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::Adjustment;
 use super::mesh::Mesh;
 use super::posed::Posed;
 use super::sections::Place;
-use crate::error::BeamError;
+use super::solution::Solution;
 
 impl Adjustment {
     /// By hold, section and point of the outline: x, y, z in metres, averaged over the hold, and the
     /// standard deviation along the outward normal, metres.
-    ///
-    /// # Errors
-    /// [`BeamError::Singular`].
-    pub fn outlines(&self, s_m: &[f64], gates: &Gates) -> Result<Vec<[f64; 4]>, BeamError> {
+    pub fn outlines(&self, s_m: &[f64], solution: &Solution) -> Vec<[f64; 4]> {
         let count = self.problem.mesh.outline[0].len();
         let holds = self.problem.holds.len();
         let mut points = Vec::with_capacity(holds * s_m.len() * count);
@@ -30,11 +27,10 @@ impl Adjustment {
                 }
             }
         }
-        let (_, factor) = self.normal(gates).0.solve().ok_or(BeamError::Singular)?;
-        let solved = factor.solve(&rows);
+        let solved = &solution.covariance * &rows;
         let sigma = |k: usize| rows.column(k).dot(&solved.column(k)).max(0.0).sqrt();
         let known = points.iter().enumerate();
-        Ok(known.map(|(k, p)| [p.x, p.y, p.z, sigma(k)]).collect())
+        known.map(|(k, p)| [p.x, p.y, p.z, sigma(k)]).collect()
     }
 
     /// Moves a place from the middle of the chord to a point of the outline.
@@ -96,7 +92,7 @@ fn local(mesh: &Mesh, node: usize, share: f64, vertex: usize) -> Vector3<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::adjust::Stage;
+    use super::super::adjust::{Gates, Stage};
     use super::super::sample;
     use super::*;
 
@@ -104,14 +100,15 @@ mod tests {
     fn an_outline_surrounds_its_section_and_what_is_seen_is_known_best() {
         let adjustment = sample::adjustment(0.0);
         let gates = Gates {
-            echo_m: 0.1,
-            edge_m: 0.1,
+            echo_m: 0.05,
+            edge_m: 0.05,
             stage: Stage::All,
         };
         let (s_m, count) = (50.0, adjustment.problem.mesh.outline[0].len());
-        let points = adjustment.outlines(&[s_m], &gates).unwrap();
+        let solution = adjustment.solution(&gates).unwrap();
+        let points = adjustment.outlines(&[s_m], &solution);
         assert_eq!(points.len(), count);
-        let middle = adjustment.knowledge(&[s_m], &gates).unwrap().0.values[0];
+        let middle = adjustment.knowledge(&[s_m], &solution).0.values[0];
         let off = |p: &[f64; 4]| Vector3::new(p[0] - middle[0], p[1] - middle[1], p[2] - middle[2]);
         // The sample's chord at 50 m is 4 - 3.4 * 50 / 60 = 1.17 m: half of it on both sides.
         let far = points.iter().map(|p| off(p).norm()).fold(0.0, f64::max);

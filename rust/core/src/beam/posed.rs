@@ -1,12 +1,13 @@
 //! A hold as the present unknowns have it: the blade at all its instants, and what moves it.
 
-use nalgebra::Vector3;
+use nalgebra::{DMatrix, Vector3};
 
 use super::axis::{Axis, Field};
 use super::family::Response;
 use super::mesh::Mesh;
 use super::shape::splines;
 use super::sight::{Instant, Section};
+use super::sums::{BOTH, MOVES};
 
 /// Time between two shapes of the blade, nanoseconds; linear in between.
 const GRID_NS: i64 = 20_000_000;
@@ -24,8 +25,8 @@ pub struct Posed {
     /// Without sway.
     pub still: Axis,
     /// Six numbers per node and unknown: rotation and displacement.
-    moves: Vec<[f64; 6]>,
-    sway_moves: Vec<[f64; 6]>,
+    moves: Vec<[f64; MOVES]>,
+    sway_moves: Vec<[f64; MOVES]>,
     unknowns: usize,
     modes: usize,
     knots: usize,
@@ -86,6 +87,7 @@ impl Posed {
             before: &self.shapes[step as usize],
             after: &self.shapes[step as usize + 1],
             share: share.clamp(0.0, 1.0),
+            apart_s: GRID_NS as f64 * 1e-9,
         }
     }
 
@@ -95,6 +97,7 @@ impl Posed {
             before: &self.still,
             after: &self.still,
             share: 0.0,
+            apart_s: GRID_NS as f64 * 1e-9,
         }
     }
 
@@ -127,13 +130,29 @@ impl Posed {
         project(&self.sway_moves, self.modes, section, along, about)
     }
 
+    /// What some unknowns of the state, by their places among the responses, do to all nodes: a column
+    /// per unknown.
+    pub fn moves(&self, places: &[usize]) -> DMatrix<f64> {
+        let nodes = self.moves.len() / self.unknowns;
+        DMatrix::from_fn(MOVES * nodes, places.len(), |i, j| {
+            self.moves[i / MOVES * self.unknowns + places[j]][i % MOVES]
+        })
+    }
+
     /// Coefficients of the sway per mode.
     pub fn knots(&self) -> usize {
         self.knots
     }
 }
 
-fn flat(mesh: &Mesh, fields: &[Field]) -> Vec<[f64; 6]> {
+/// How the moves of both nodes of a section's element move `along . displacement + about . rotation` of it.
+pub fn node_slopes(section: &Section, along: &Vector3<f64>, about: &Vector3<f64>) -> [f64; BOTH] {
+    let weights = [about.x, about.y, about.z, along.x, along.y, along.z];
+    let shares = [1.0 - section.share, section.share];
+    std::array::from_fn(|i| shares[i / MOVES] * weights[i % MOVES])
+}
+
+fn flat(mesh: &Mesh, fields: &[Field]) -> Vec<[f64; MOVES]> {
     let at = |node: usize| {
         fields.iter().map(move |field| {
             let (turn, place) = (&field.turn[node], &field.place[node]);
@@ -144,7 +163,7 @@ fn flat(mesh: &Mesh, fields: &[Field]) -> Vec<[f64; 6]> {
 }
 
 fn project<'a>(
-    moves: &'a [[f64; 6]],
+    moves: &'a [[f64; MOVES]],
     count: usize,
     section: &Section,
     along: &Vector3<f64>,
@@ -152,11 +171,9 @@ fn project<'a>(
 ) -> impl Iterator<Item = f64> + 'a {
     let inner = &moves[section.node * count..][..count];
     let outer = &moves[(section.node + 1) * count..][..count];
-    let weights = [about.x, about.y, about.z, along.x, along.y, along.z];
-    let (low, high) = (1.0 - section.share, section.share);
+    let slopes = node_slopes(section, along, about);
     inner.iter().zip(outer).map(move |(a, b)| {
-        (0..6)
-            .map(|k| weights[k] * (low * a[k] + high * b[k]))
-            .sum()
+        let moves = a.iter().chain(b);
+        moves.zip(&slopes).map(|(part, slope)| part * slope).sum()
     })
 }

@@ -89,6 +89,7 @@ impl Adjustment {
             prior.matrix[(place, place)] = tight;
             prior.right[place] = tight * (self.expected[i] - self.values[i]);
         }
+        self.tie_clocks(&mut prior);
         if self.free.contains(&rig) {
             let at = rig - self.free.start;
             let hold = if stage == Stage::All { 1.0 } else { HELD };

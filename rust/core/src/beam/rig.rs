@@ -14,6 +14,8 @@ pub struct Rig {
     pub poses: Vec<WorldFromSensor>,
     /// Channels of each lidar.
     pub channels: Vec<usize>,
+    /// Standard deviation of each lidar's clock against the others, seconds.
+    pub clock_s: Vec<f64>,
     /// By lidar: rotation (3), translation (3), elevation, scale, channel offsets; as estimated so far.
     pub values: DVector<f64>,
     /// Before the data: expected values ...
@@ -42,6 +44,7 @@ impl Rig {
     pub fn new(
         poses: Vec<WorldFromSensor>,
         channels: Vec<usize>,
+        clock_s: Vec<f64>,
         prior: DVector<f64>,
         mut covariance: DMatrix<f64>,
     ) -> Result<Self, InvalidValue> {
@@ -54,6 +57,7 @@ impl Rig {
         if covariance.shape() != (count, count)
             || prior.len() != count
             || poses.len() != channels.len()
+            || clock_s.len() != channels.len()
         {
             return Err(refuse(format!(
                 "{:?} and {} values",
@@ -71,6 +75,7 @@ impl Rig {
         Ok(Self {
             poses,
             channels,
+            clock_s,
             values: prior.clone(),
             prior,
             information: factor.inverse(),

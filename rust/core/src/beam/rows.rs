@@ -6,18 +6,19 @@ use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M};
 use super::common;
 use super::echoes::{Echo, Edge};
 use super::layout::RIG;
-use super::normal::Normal;
-use super::posed::Posed;
+use super::posed::{Posed, node_slopes};
 use super::rig::Lidar;
 use super::sight::{Contact, Hit, ScanPlane, Silhouette};
-use super::weights::{EdgeMet, Tally, Used, robust};
+use super::sums::{BOTH, Part, Row, Sums};
+use super::weights::{EdgeMet, Tally, Used, faded, robust};
 
 /// Echoes nearer to the end of their run than this are mixed with what lies behind.
 const MIXED_ECHOES: u32 = 2;
-/// Rays that meet the surface at a flatter angle are left out, cosine of incidence.
-const FLATTEST_COSINE: f64 = 0.25;
-/// An edge beside facets seen at a grazing angle over more than this is soft, metres across.
-const SOFT_M: f64 = 0.012;
+/// Rays that meet the surface at a flatter angle count less, and from the second one on not at all,
+/// cosine of incidence: an echo that comes and goes with the estimate would never let it settle.
+const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
+/// The same of edges beside facets seen at a grazing angle over so much, metres across: they are soft.
+const SOFT_M: (f64, f64) = (0.008, 0.016);
 
 /// Makes the rows of one hold.
 pub struct Rows<'a> {
@@ -26,8 +27,8 @@ pub struct Rows<'a> {
     gates: &'a Gates,
     hold: usize,
     posed: Posed,
-    state: Vec<usize>,
-    normal: Normal,
+    sums: Sums,
+    entries: Vec<(usize, f64)>,
     tally: Tally,
 }
 
@@ -44,21 +45,22 @@ impl<'a> Rows<'a> {
             gates,
             hold,
             posed: adjustment.posed(hold),
-            state: adjustment.state_at(hold),
-            normal: Normal::new(adjustment.free.clone()),
+            sums: Sums::new(
+                adjustment.problem.mesh.len(),
+                adjustment.touched_at(hold),
+                &adjustment.free,
+            ),
+            entries: Vec::new(),
             tally: Tally::default(),
             adjustment,
         }
     }
 
     /// All rows, and what became of the data.
-    pub fn collect(mut self) -> (Normal, Tally) {
+    pub fn collect(mut self) -> (Part, Tally) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let stride = seen
-            .echoes
-            .len()
-            .div_ceil(self.adjustment.weights.echoes)
-            .max(1);
+        let most = self.adjustment.weights.echoes;
+        let stride = seen.echoes.len().div_ceil(most).max(1);
         let mut hint = None;
         for echo in seen.echoes.iter().step_by(stride) {
             hint = self.add_echo(echo, hint);
@@ -66,15 +68,25 @@ impl<'a> Rows<'a> {
         for edge in &seen.edges {
             self.add_edge(edge);
         }
-        (self.normal, self.tally)
+        self.finish()
     }
 
     /// The rows of the edges alone.
-    pub(super) fn of_edges(mut self) -> Normal {
+    pub(super) fn of_edges(mut self) -> Part {
         for edge in &self.adjustment.problem.holds[self.hold].seen.edges {
             self.add_edge(edge);
         }
-        self.normal
+        self.finish().0
+    }
+
+    fn finish(self) -> (Part, Tally) {
+        let free = &self.adjustment.free;
+        let state = self.adjustment.state_at(self.hold).into_iter().enumerate();
+        let (places, unknowns): (Vec<_>, Vec<_>) = state.filter(|(_, i)| free.contains(i)).unzip();
+        (
+            self.sums.part(&unknowns, &self.posed.moves(&places)),
+            self.tally,
+        )
     }
 
     /// Adds one echo; gives the arc length at which it met the blade, for the next one.
@@ -86,12 +98,12 @@ impl<'a> Rows<'a> {
             return None;
         };
         let arc_m = Some(self.arc_m(&hit.contact));
-        if echo.from_end < MIXED_ECHOES || hit.cosine < FLATTEST_COSINE {
+        let upright = faded(hit.cosine, FLAT_COSINE);
+        if echo.from_end < MIXED_ECHOES || upright == 0.0 {
             self.tally.unfit += 1;
             return arc_m;
         }
-        let mut row = self.echo_row(echo, &hit);
-        let misread_m = self.misread_m(&row);
+        let misread_m = self.misread_m(echo.lidar, hit.cosine);
         let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - misread_m;
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
@@ -119,8 +131,13 @@ impl<'a> Rows<'a> {
             None => 1.0 + weights.surface_m * weights.surface_m * alone,
         };
         let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
-        self.normal.add(&mut row, residual, weight);
+        self.add_hit(echo, &hit, residual, upright * weight);
         arc_m
+    }
+
+    /// Instant of a shot by the clock that all lidars share, as thought so far.
+    fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
+        stamp_ns + (self.adjustment.clock_s(lidar) * 1e9).round() as i64
     }
 
     fn hit(
@@ -131,7 +148,7 @@ impl<'a> Rows<'a> {
         hint: Option<f64>,
     ) -> Option<Hit> {
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(echo.time_ns);
+        let blade = self.posed.at(self.time_ns(echo.lidar, echo.time_ns));
         let near = hint.and_then(|s_m| blade.hit(mesh, &lidar.origin, direction, s_m));
         near.or_else(|| {
             let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
@@ -158,43 +175,54 @@ impl<'a> Rows<'a> {
         common::patch(self.arc_m(contact), is_second_side, contact.x_c)
     }
 
-    /// What errors of range add to the prediction, by a row's slopes.
-    fn misread_m(&self, row: &[(usize, f64)]) -> f64 {
-        let (layout, values) = (&self.adjustment.layout, &self.adjustment.values);
-        let ranges = layout.range_at(0)..;
-        let of_ranges = row.iter().filter(|entry| ranges.contains(&entry.0));
-        of_ranges
-            .map(|(unknown, slope)| slope * values[*unknown])
-            .sum()
+    /// What errors of range add to the prediction.
+    fn misread_m(&self, lidar: usize, cosine: f64) -> f64 {
+        let first = self.adjustment.layout.range_at(lidar);
+        let values = &self.adjustment.values;
+        let slopes = range_slopes_m(cosine);
+        slopes[0] * values[first] + slopes[1] * values[first + 1]
     }
 
-    fn echo_row(&self, echo: &Echo, hit: &Hit) -> Vec<(usize, f64)> {
+    fn add_hit(&mut self, echo: &Echo, hit: &Hit, residual: f64, weight: f64) {
         let along = -hit.contact.normal / hit.cosine;
-        let mut row = self.row(&hit.contact, &along, echo.lidar, echo.time_ns);
+        let time_ns = self.time_ns(echo.lidar, echo.time_ns);
+        let moves = self.fill_row(&hit.contact, &along, echo.lidar, time_ns);
         let layout = &self.adjustment.layout;
         let first = layout.lidar_at(echo.lidar);
-        row.push((first + 7, -hit.range_m));
+        self.entries.push((first + 7, -hit.range_m));
         if echo.ring < layout.channels[echo.lidar] {
-            row.push((first + RIG + echo.ring, -1.0));
+            self.entries.push((first + RIG + echo.ring, -1.0));
         }
         let ranges = layout.range_at(echo.lidar);
-        row.push((ranges, RANGE_M[0]));
-        row.push((ranges + 1, RANGE_M[1] * (1.0 / hit.cosine - 1.0)));
-        row
+        let slopes = range_slopes_m(hit.cosine);
+        self.entries
+            .extend([(ranges, slopes[0]), (ranges + 1, slopes[1])]);
+        self.add_row(&hit.contact, moves, residual, weight);
     }
 
-    /// How all unknowns but range errors move `along . displacement` of a contact against the lidar.
-    fn row(
-        &self,
+    fn add_row(&mut self, contact: &Contact, moves: [f64; BOTH], residual: f64, weight: f64) {
+        self.sums.add(&Row {
+            node: contact.section.node,
+            moves,
+            others: &self.entries,
+            residual,
+            weight,
+        });
+    }
+
+    /// How the nodes, and all unknowns but the state's and range errors, move `along . displacement` of
+    /// a contact against the lidar: the latter in `entries`.
+    fn fill_row(
+        &mut self,
         contact: &Contact,
         along: &Vector3<f64>,
         lidar: usize,
         time_ns: i64,
-    ) -> Vec<(usize, f64)> {
+    ) -> [f64; BOTH] {
         let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
         let about = (contact.point - contact.section.place).cross(along);
-        let slopes = self.posed.slopes(&contact.section, along, &about);
-        let mut row: Vec<(usize, f64)> = self.state.iter().copied().zip(slopes).collect();
+        let row = &mut self.entries;
+        row.clear();
         let (knot, weights) = self.posed.beat(time_ns);
         let sway = self.posed.sway_slopes(&contact.section, along, &about);
         for (mode, slope) in sway.enumerate() {
@@ -205,15 +233,20 @@ impl<'a> Rows<'a> {
                     .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
             );
         }
-        let (mesh, first) = (&problem.mesh, layout.shape_at());
-        problem.shape.slopes(mesh, contact, along, first, &mut row);
-        problem.shape.waves(mesh, contact, along, first, &mut row);
-        self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), &mut row);
+        let velocity_m_s = self.posed.at(time_ns).velocity_m_s(contact);
+        let clock_s = self.adjustment.rig.clock_s[lidar];
+        row.push((layout.clock_at(lidar), along.dot(&velocity_m_s) * clock_s));
+        if self.adjustment.free.end > layout.lidar_at(0) {
+            let (mesh, first) = (&problem.mesh, layout.shape_at());
+            problem.shape.slopes(mesh, contact, along, first, row);
+            problem.shape.waves(mesh, contact, along, first, row);
+            self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), row);
+        }
         if self.adjustment.free.end > layout.len() {
             // A strain is fitted as a check: everything moves away from the root.
             row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
         }
-        row
+        node_slopes(&contact.section, along, &about)
     }
 
     fn add_edge(&mut self, edge: &Edge) {
@@ -227,13 +260,13 @@ impl<'a> Rows<'a> {
             aside: (miss - hit * hit.dot(&miss)).normalize(),
         };
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(edge.time_ns);
+        let blade = self.posed.at(self.time_ns(edge.lidar, edge.time_ns));
         let near = blade.nearest_s_m(mesh, &plane.origin, &hit);
         let Some(silhouette) = blade.silhouette(mesh, &plane, near) else {
             self.tally.edges_left_out[1] += 1;
             return;
         };
-        if silhouette.soft_m > SOFT_M {
+        if firmness(&silhouette) == 0.0 {
             self.tally.edges_left_out[0] += 1;
             return;
         }
@@ -252,7 +285,6 @@ impl<'a> Rows<'a> {
         let at = layout.edge_offset_at(self.hold, edge.lidar, side);
         let values = &self.adjustment.values;
         let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
-        let mut row = self.edge_row(edge, plane, silhouette);
         if self.adjustment.muted.contains(&(edge.lidar, side)) {
             self.tally.edges_left_out[2] += 1;
             return;
@@ -279,26 +311,39 @@ impl<'a> Rows<'a> {
             residual_rad: residual,
             step_rad,
         });
-        row.push((layout.edge_at(), EDGE_RAD));
-        row.push((at, EDGE_OFFSET_RAD));
         let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
-        self.normal.add(&mut row, residual, weight);
+        let edge_at = layout.edge_at();
+        let along = across(plane, silhouette);
+        let time_ns = self.time_ns(edge.lidar, edge.time_ns);
+        let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
+        self.entries
+            .extend([(edge_at, EDGE_RAD), (at, EDGE_OFFSET_RAD)]);
+        self.add_row(
+            &silhouette.contact,
+            moves,
+            residual,
+            firmness(silhouette) * weight,
+        );
     }
+}
 
-    fn edge_row(
-        &self,
-        edge: &Edge,
-        plane: &ScanPlane,
-        silhouette: &Silhouette,
-    ) -> Vec<(usize, f64)> {
-        let to = silhouette.contact.point - plane.origin;
-        let range = to.norm();
-        let aside = (plane.aside - to * (plane.aside.dot(&to) / (range * range))).normalize();
-        let slope = silhouette.slope;
-        let normal = to.cross(&slope).normalize();
-        let along = normal / (normal.dot(&aside) * range);
-        self.row(&silhouette.contact, &along, edge.lidar, edge.time_ns)
-    }
+/// By how much a displacement widens the angle of a silhouette, rad/m.
+fn across(plane: &ScanPlane, silhouette: &Silhouette) -> Vector3<f64> {
+    let to = silhouette.contact.point - plane.origin;
+    let range = to.norm();
+    let aside = (plane.aside - to * (plane.aside.dot(&to) / (range * range))).normalize();
+    let normal = to.cross(&silhouette.slope).normalize();
+    normal / (normal.dot(&aside) * range)
+}
+
+/// How the range errors of a lidar add to its ranges, metres.
+fn range_slopes_m(cosine: f64) -> [f64; 2] {
+    [RANGE_M[0], RANGE_M[1] * (1.0 / cosine - 1.0)]
+}
+
+/// Share of its weight that an edge keeps: less where the surface turns away slowly or is seen edge-on.
+fn firmness(silhouette: &Silhouette) -> f64 {
+    faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE)
 }
 
 /// 0 at the leading edge, 1 at the trailing edge.
@@ -321,7 +366,7 @@ mod tests {
     #[test]
     fn slopes_of_all_unknowns_are_those_of_the_residuals() {
         let adjustment = sample::adjustment(0.02);
-        let (normal, _) = adjustment.normal(&WIDE);
+        let ((normal, _), prior) = (adjustment.normal(&WIDE), adjustment.prior(WIDE.stage));
         let step = 0.02;
         let cost = |unknown: usize, change: f64| {
             let mut moved = adjustment.clone();
@@ -334,7 +379,8 @@ mod tests {
             // Unknowns of the lidars have units of their own.
             let step = if rig.contains(&unknown) { 1e-5 } else { step };
             let slope = (cost(unknown, step) - cost(unknown, -step)) / (2.0 * step);
-            let expected = -2.0 * normal.right[unknown];
+            // The cost is that of the data, without what was known before.
+            let expected = -2.0 * (normal.right[unknown] - prior.right[unknown]);
             let close = (slope - expected).abs() < 0.03 * expected.abs() + 2e-3 * scale;
             assert!(close, "unknown {unknown}: {slope} instead of {expected}");
         }

@@ -1,5 +1,7 @@
 //! A small test of known outcome: a straight blade bent a little, seen by one lidar through the model.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Vector3};
 
 use super::adjust::{Adjustment, Hold, Problem};
@@ -58,7 +60,7 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
     let saddles = vec![mesh.node_at(20.0), mesh.node_at(40.0)];
     let force_n = vec![Vector3::x() * 3e4; 2];
     let hold = Hold {
-        seen: Seen::default(),
+        seen: Arc::default(),
         span_ns: SPAN_NS,
         loading: Loading {
             force_n: force_n.clone(),
@@ -81,6 +83,7 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
     let rig = Rig::new(
         vec![pose],
         vec![CHANNELS],
+        vec![1e-3],
         DVector::zeros(size),
         DMatrix::identity(size, size) * 1e-6,
     );
@@ -92,7 +95,7 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
         common: Vec::new(),
     };
     let mut adjustment = Adjustment::new(problem, rig.unwrap(), weights).unwrap();
-    adjustment.problem.holds[0].seen = look(&adjustment, shift_m);
+    adjustment.problem.holds[0].seen = Arc::new(look(&adjustment, shift_m));
     adjustment
 }
 

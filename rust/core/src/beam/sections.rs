@@ -184,7 +184,7 @@ impl Adjustment {
             let along = Vector3::ith(axis, 1.0);
             self.fill(&mut rows, axis, of, place, &along, &Vector3::zeros());
         }
-        let sway = self.layout.sway_at(0)..self.layout.lidar_at(0);
+        let sway = self.layout.sway_at(0)..self.layout.clock_at(0);
         let (of_sway, count) = (rows.rows(sway.start, sway.len()), sway.len());
         let values = self.values.rows(sway.start, count);
         Vector3::from_iterator(of_sway.tr_mul(&values).iter().copied())

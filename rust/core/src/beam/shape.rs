@@ -44,13 +44,13 @@ impl Default for ShapeTrust {
 }
 
 /// Waves over the chord of each side.
-const CHORD_WAVES: usize = 4;
+const CHORD_WAVES: usize = 6;
 /// Share of the chord beside an edge over which waves rise to their height.
 const NEAR_EDGE: f64 = 0.04;
 /// Chord from which on waves have their full height, metres.
 const FULL_WAVES_M: f64 = 1.0;
 /// Distance between the knots of the waves, metres.
-const KNOT_M: f64 = 3.0;
+const KNOT_M: f64 = 2.0;
 
 /// Unknowns of the surface, in standard deviations.
 #[derive(Debug, Clone)]

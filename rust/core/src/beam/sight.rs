@@ -20,6 +20,8 @@ pub struct Instant<'a> {
     pub after: &'a Axis,
     /// Share of the way between both.
     pub share: f64,
+    /// Time between both, seconds.
+    pub apart_s: f64,
 }
 
 /// A section at one instant.
@@ -76,6 +78,8 @@ pub struct Silhouette {
     pub range_m: f64,
     /// Width of the strip beside it that is seen at a grazing angle, metres across the view.
     pub soft_m: f64,
+    /// Cosine of incidence on the strip beside it: a blade seen edge-on has no edge that echoes tell.
+    pub cosine: f64,
     /// World direction of the silhouette along the span, per metre of arc length.
     pub slope: Vector3<f64>,
 }
@@ -112,6 +116,15 @@ impl Instant<'_> {
         }
     }
 
+    /// How fast a point of the surface moves, world, metres per second.
+    pub fn velocity_m_s(&self, contact: &Contact) -> Vector3<f64> {
+        let (section, local) = (&contact.section, &contact.local);
+        let at = |axis: &Axis, node: usize| axis.place[node] + axis.turn[node] * local;
+        let moved = |node: usize| at(self.after, node) - at(self.before, node);
+        let (inner, outer) = (moved(section.node), moved(section.node + 1));
+        (inner + (outer - inner) * section.share) / self.apart_s
+    }
+
     fn turn(&self, node: usize) -> Matrix3<f64> {
         let (a, b) = (&self.before.turn[node], &self.after.turn[node]);
         a + (b - a) * self.share
@@ -146,12 +159,21 @@ impl Instant<'_> {
         direction: &Vector3<f64>,
         start_m: f64,
     ) -> Option<Hit> {
-        let mut s_m = start_m;
+        let (mut s_m, mut last) = (start_m, None);
         for _ in 0..STEPS {
             let section = self.section(mesh, s_m);
             let from = section.turn.tr_mul(&(origin - section.place));
             let way = section.turn.tr_mul(direction);
-            let (edge, along, range_m) = cross(mesh, &section, &from, &way)?;
+            let line = Line {
+                mesh,
+                section: &section,
+                from: &from,
+                way: &way,
+            };
+            let (edge, along, range_m) = last
+                .and_then(|edge| line.cross_near(edge))
+                .or_else(|| line.cross())?;
+            last = Some(edge);
             let ahead_m = from.z + way.z * range_m;
             if ahead_m.abs() < CONVERGED_M {
                 let contact = contact(mesh, section, edge, along);
@@ -183,87 +205,114 @@ impl Instant<'_> {
             return None;
         }
         let count = mesh.outline[0].len();
-        let section = self.section(mesh, s_m);
-        let view = |vertex: usize| seen(mesh, plane, &across, &section, vertex, s_m);
-        let views: Vec<View> = (0..count).map(view).collect();
-        let outermost = (0..count).max_by(|a, b| views[*a].angle.total_cmp(&views[*b].angle))?;
+        let cut = Cut::new(mesh, plane, self.section(mesh, s_m), s_m);
+        let views: Vec<View> = (0..count).map(|vertex| cut.view(vertex)).collect();
+        let outermost =
+            (0..count).max_by(|a, b| views[*a].width().total_cmp(&views[*b].width()))?;
         let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
         let refined = near.map(|vertex| {
-            (
-                vertex,
-                self.refine(mesh, plane, &across, vertex, views[vertex].s_m),
-            )
+            let view = self.refine(mesh, plane, vertex, views[vertex].s_m);
+            (vertex, view)
         });
         let best = refined
             .iter()
-            .max_by(|a, b| a.1.angle.total_cmp(&b.1.angle))?;
+            .max_by(|a, b| a.1.width().total_cmp(&b.1.width()))?;
         if !(0.0..=mesh.length_m()).contains(&best.1.s_m) {
             return None;
         }
         let section = self.section(mesh, best.1.s_m);
         let contact = contact(mesh, section, best.0, 0.0);
+        let step = if is_seen_ahead(&views, best.0) {
+            1
+        } else {
+            count - 1
+        };
         Some(Silhouette {
             contact,
-            angle_rad: best.1.angle,
+            angle_rad: best.1.aside_m.atan2(best.1.ahead_m),
             range_m: (contact.point - plane.origin).norm(),
-            soft_m: softness_m(&views, best.0),
+            soft_m: softness_m(&views, best.0, step),
+            cosine: steepness(&views, best.0, step),
             slope: section.turn * span_slope(mesh, &section, best.0, 0.0, &contact.local),
         })
     }
 
-    fn refine(
-        &self,
-        mesh: &Mesh,
-        plane: &ScanPlane,
-        across: &Vector3<f64>,
-        vertex: usize,
-        s_m: f64,
-    ) -> View {
-        let view = |s_m| seen(mesh, plane, across, &self.section(mesh, s_m), vertex, s_m);
+    fn refine(&self, mesh: &Mesh, plane: &ScanPlane, vertex: usize, s_m: f64) -> View {
+        let view = |s_m| Cut::new(mesh, plane, self.section(mesh, s_m), s_m).view(vertex);
         view(view(s_m).s_m)
     }
 }
 
-/// Where a point of the outline passes through a scan plane, by its slope at `s_m` in `section`.
-fn seen(
-    mesh: &Mesh,
-    plane: &ScanPlane,
-    across: &Vector3<f64>,
-    section: &Section,
-    vertex: usize,
+/// A scan plane in the directions of a section.
+struct Cut<'a> {
+    mesh: &'a Mesh,
+    section: Section,
     s_m: f64,
-) -> View {
-    let local = local(mesh, section, vertex, 0.0);
-    let slope = section.turn * span_slope(mesh, section, vertex, 0.0, &local);
-    let point = section.place + section.turn * local;
-    let step = -across.dot(&(point - plane.origin)) / across.dot(&slope);
-    let to = point + slope * step - plane.origin;
-    let (ahead_m, aside_m) = (to.dot(&plane.ahead), to.dot(&plane.aside));
-    View {
-        angle: aside_m.atan2(ahead_m),
-        s_m: s_m + step,
-        ahead_m,
-        aside_m,
+    /// Across the plane, ahead and aside in it: a line each.
+    axes: Matrix3<f64>,
+    /// The section's place along these from the plane's origin, metres.
+    place: Vector3<f64>,
+}
+
+impl<'a> Cut<'a> {
+    fn new(mesh: &'a Mesh, plane: &ScanPlane, section: Section, s_m: f64) -> Self {
+        let across = plane.ahead.cross(&plane.aside);
+        let axes = Matrix3::from_columns(&[across, plane.ahead, plane.aside]).transpose();
+        Self {
+            mesh,
+            s_m,
+            place: axes * (section.place - plane.origin),
+            axes: axes * section.turn,
+            section,
+        }
+    }
+
+    /// Where a point of the outline passes through the plane, by its slope in the section.
+    fn view(&self, vertex: usize) -> View {
+        let local = local(self.mesh, &self.section, vertex, 0.0);
+        let slope = self.axes * span_slope(self.mesh, &self.section, vertex, 0.0, &local);
+        let point = self.place + self.axes * local;
+        let step = -point.x / slope.x;
+        View {
+            s_m: self.s_m + step,
+            ahead_m: point.y + slope.y * step,
+            aside_m: point.z + slope.z * step,
+        }
     }
 }
 
 /// A point of the outline as a scan plane sees it.
 #[derive(Debug, Clone, Copy)]
 struct View {
-    angle: f64,
     s_m: f64,
     ahead_m: f64,
     aside_m: f64,
 }
 
-/// Width across the view of the facets beside the silhouette that are seen at a grazing angle.
-fn softness_m(views: &[View], outermost: usize) -> f64 {
+impl View {
+    /// Tangent of the angle from ahead; the blade is in front of the sensor.
+    fn width(&self) -> f64 {
+        self.aside_m / self.ahead_m
+    }
+}
+
+/// Cosine of incidence on the strip beside the silhouette, on the side that is seen.
+fn steepness(views: &[View], outermost: usize, step: usize) -> f64 {
+    const STRIP_M: f64 = 0.05;
     let count = views.len();
-    let step = if is_seen_ahead(views, outermost) {
-        1
-    } else {
-        count - 1
+    let inward = (1..count / 2).map(|k| views[(outermost + k * step) % count]);
+    let from = views[outermost];
+    let cosine = |to: View| {
+        let wide = from.aside_m - to.aside_m;
+        (wide, wide / wide.hypot(from.ahead_m - to.ahead_m).max(1e-9))
     };
+    let mut strip = inward.map(cosine).skip_while(|found| found.0 < STRIP_M);
+    strip.next().map_or(0.0, |found| found.1)
+}
+
+/// Width across the view of the facets beside the silhouette that are seen at a grazing angle.
+fn softness_m(views: &[View], outermost: usize, step: usize) -> f64 {
+    let count = views.len();
     let mut width_m = 0.0;
     let mut a = outermost;
     for _ in 0..count / 2 {
@@ -297,42 +346,64 @@ fn is_seen_ahead(views: &[View], outermost: usize) -> bool {
     depth(1) < depth(count - 1)
 }
 
-/// First facet of the outline that a line in the section's plane enters: its first point, the place
-/// on it, and the distance along the line.
-fn cross(
-    mesh: &Mesh,
-    section: &Section,
-    from: &Vector3<f64>,
-    way: &Vector3<f64>,
-) -> Option<(usize, f64, f64)> {
-    let (inner, outer) = (&mesh.outline[section.node], &mesh.outline[section.node + 1]);
-    let at = |i: usize| {
-        let (a, b) = (inner[i], outer[i]);
-        (
-            a[0] + (b[0] - a[0]) * section.share - from.x,
-            a[1] + (b[1] - a[1]) * section.share - from.y,
-        )
-    };
-    let side = |p: (f64, f64)| way.x * p.1 - way.y * p.0;
-    let count = inner.len();
-    let mut best: Option<(usize, f64, f64)> = None;
-    let mut last = at(count - 1);
-    let mut last_side = side(last);
-    for i in 0..count {
-        let point = at(i);
-        let this_side = side(point);
-        if (last_side > 0.0) != (this_side > 0.0) {
-            let along = last_side / (last_side - this_side);
-            let x = last.0 + (point.0 - last.0) * along;
-            let y = last.1 + (point.1 - last.1) * along;
-            let range = (x * way.x + y * way.y) / (way.x * way.x + way.y * way.y);
-            if range > 0.0 && best.is_none_or(|b| range < b.2) {
-                best = Some(((i + count - 1) % count, along, range));
-            }
-        }
-        (last, last_side) = (point, this_side);
+/// A line in the plane of a section, in its directions.
+struct Line<'a> {
+    mesh: &'a Mesh,
+    section: &'a Section,
+    from: &'a Vector3<f64>,
+    way: &'a Vector3<f64>,
+}
+
+/// First point of a facet, the place on it, and the distance along a line that crosses it.
+type Crossing = (usize, f64, f64);
+
+impl Line<'_> {
+    /// First facet of the outline that the line meets.
+    fn cross(&self) -> Option<Crossing> {
+        let count = self.mesh.outline[self.section.node].len();
+        self.first((count - 1..count).chain(0..count))
     }
-    best
+
+    /// The same among those beside a facet that it met a little farther along the span.
+    fn cross_near(&self, edge: usize) -> Option<Crossing> {
+        let count = self.mesh.outline[self.section.node].len();
+        self.first((edge + count - 1..edge + count + 3).map(|i| i % count))
+    }
+
+    /// First facet that the line meets among those between neighbouring points.
+    fn first(&self, points: impl Iterator<Item = usize>) -> Option<Crossing> {
+        let way = self.way;
+        let side = |p: (f64, f64)| way.x * p.1 - way.y * p.0;
+        let mut points = points.map(|i| (i, self.at(i)));
+        let (mut index, mut last) = points.next()?;
+        let mut last_side = side(last);
+        let mut best: Option<Crossing> = None;
+        for (next, point) in points {
+            let this_side = side(point);
+            if (last_side > 0.0) != (this_side > 0.0) {
+                let along = last_side / (last_side - this_side);
+                let x = last.0 + (point.0 - last.0) * along;
+                let y = last.1 + (point.1 - last.1) * along;
+                let range = (x * way.x + y * way.y) / (way.x * way.x + way.y * way.y);
+                if range > 0.0 && best.is_none_or(|b| range < b.2) {
+                    best = Some((index, along, range));
+                }
+            }
+            (index, last, last_side) = (next, point, this_side);
+        }
+        best
+    }
+
+    /// A point of the outline from the start of the line.
+    fn at(&self, i: usize) -> (f64, f64) {
+        let node = self.section.node;
+        let (a, b) = (self.mesh.outline[node][i], self.mesh.outline[node + 1][i]);
+        let share = self.section.share;
+        (
+            a[0] + (b[0] - a[0]) * share - self.from.x,
+            a[1] + (b[1] - a[1]) * share - self.from.y,
+        )
+    }
 }
 
 /// Point of the outline at a vertex and a share of the way to the next one.
@@ -404,4 +475,39 @@ fn outward(
     let slope = span_slope(mesh, section, vertex, along, local);
     // The outline runs round the section in the sense that the hand of the blade gives it.
     (slope.cross(&facet) * mesh.hand).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn the_facet_beside_the_last_one_is_the_one_that_a_search_of_all_finds() {
+        let adjustment = sample::adjustment(0.0);
+        let (mesh, posed) = (&adjustment.problem.mesh, adjustment.posed(0));
+        let (blade, origin) = (posed.at(0), adjustment.rig.lidar(0).origin);
+        let mut hits = 0;
+        for k in 0..2000 {
+            let even = |step: f64| (f64::from(k) * step).fract() - 0.5;
+            let towards = Vector3::new(5.0 * even(0.618_034), 8.0, 16.0 * even(0.754_878));
+            let direction = towards.normalize();
+            let start_m = blade.nearest_s_m(mesh, &origin, &direction);
+            let Some(hit) = blade.hit(mesh, &origin, &direction, start_m) else {
+                continue;
+            };
+            let section = hit.contact.section;
+            let line = Line {
+                mesh,
+                from: &section.turn.tr_mul(&(origin - section.place)),
+                way: &section.turn.tr_mul(&direction),
+                section: &section,
+            };
+            let (vertex, _, range_m) = line.cross().unwrap();
+            assert_eq!(vertex, hit.contact.vertex);
+            assert!((range_m - hit.range_m).abs() < 1e-9);
+            hits += 1;
+        }
+        assert!(hits > 100, "{hits}");
+    }
 }

@@ -1,8 +1,10 @@
 //! How an adjustment goes from one estimate to the next.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::adjust::{Adjustment, Gates, Stage};
+use super::axis::Axis;
 use super::normal::Normal;
 use super::weights::Tally;
 use crate::error::BeamError;
@@ -11,8 +13,6 @@ use crate::error::BeamError;
 const LARGEST_STEP: f64 = 3.0;
 /// The same where deviations are those of blades in general.
 const LARGEST_VAGUE_STEP: f64 = 0.3;
-/// Gate from which on residuals tell of the data, not of a blade that is elsewhere, metres.
-const LEARNED_M: f64 = 0.1;
 /// Gate at which steps are held back as a prior would, metres.
 const FREE_GATE_M: f64 = 0.025;
 /// A step that takes back so much of the last one is halved: the truth lies between both.
@@ -20,21 +20,41 @@ const TURNED_BACK: f64 = 0.5;
 /// The same of the surface, whose unknowns are many and each of little effect.
 const LARGEST_WAVE: f64 = 6.0;
 
+/// A step may lead so far from where the slopes say it leads, as a share of the gate: loads and stiffness
+/// multiply, and what they do together no slope tells ...
+const ASTRAY: f64 = 0.1;
+/// ... so it is shortened, at most so often.
+const SHORTENED: usize = 6;
+
 /// What one iteration did.
 #[derive(Debug, Clone)]
 pub struct Step {
     /// Largest change of an unknown of the blade, standard deviations.
     pub largest: f64,
+    /// Largest move of the axis in any hold, metres.
+    pub moved_m: f64,
     /// What became of the data, by hold.
     pub tallies: Vec<Tally>,
 }
 
 impl Adjustment {
-    /// One step of Gauss and Newton with data inside of the gates.
+    /// One step of Gauss and Newton with data inside of the gates, no longer than slopes are good for.
     ///
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
+        self.take(gates, ASTRAY * gates.echo_m)
+    }
+
+    /// The same where the slopes are the model: a stretch never solves its equilibrium anew.
+    ///
+    /// # Errors
+    /// [`BeamError::Singular`].
+    pub(super) fn slope_step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
+        self.take(gates, f64::INFINITY)
+    }
+
+    fn take(&mut self, gates: &Gates, astray_m: f64) -> Result<Step, BeamError> {
         let (mut normal, tallies) = self.normal(gates);
         self.damp(&mut normal, gates);
         let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
@@ -51,16 +71,53 @@ impl Adjustment {
         if self.is_vague() {
             self.settle(&mut step);
         }
-        self.values += &step;
+        let moved_m = self.go(&mut step, astray_m);
         self.rig.values += step.rows(rig, count);
         self.values.rows_mut(rig, count).fill(0.0);
         if self.free.contains(&self.layout.shape_at()) {
             self.build();
         }
-        if gates.stage == Stage::All {
-            self.weights.learn(&tallies, gates.echo_m <= LEARNED_M);
+        if gates.is_fine() {
+            self.weights.learn(&tallies);
         }
-        Ok(Step { largest, tallies })
+        Ok(Step {
+            largest,
+            moved_m,
+            tallies,
+        })
+    }
+
+    /// Goes a step, or as much of it as leads where the slopes say it leads; how far the axis moves.
+    fn go(&mut self, step: &mut DVector<f64>, astray_m: f64) -> f64 {
+        let holds = 0..self.problem.holds.len();
+        let from: Vec<Axis> = holds.map(|hold| self.still(hold)).collect();
+        let start = self.values.clone();
+        let tries = if astray_m.is_finite() { SHORTENED } else { 0 };
+        for _ in 0..tries {
+            self.values = &start + &*step;
+            let far_m = self.astray_m();
+            if far_m <= astray_m {
+                break;
+            }
+            // What two unknowns do together grows with the square of the step.
+            *step *= (astray_m / far_m).sqrt().clamp(0.2, 0.9);
+        }
+        self.values = start + &*step;
+        let moved = |(hold, from): (usize, &Axis)| from.farthest_m(&self.still(hold));
+        from.iter().enumerate().map(moved).fold(0.0, f64::max)
+    }
+
+    /// How far the equilibria lie from where the slopes have them, metres; infinite without one.
+    fn astray_m(&self) -> f64 {
+        let far_m = |hold: usize| {
+            let thought = self.still(hold);
+            let found = self
+                .physics(hold)
+                .solve(&self.problem.mesh, &thought.curvature);
+            found.map_or(f64::INFINITY, |found| thought.farthest_m(&found))
+        };
+        let holds = (0..self.problem.holds.len()).into_par_iter();
+        holds.map(far_m).reduce(|| 0.0, f64::max)
     }
 
     /// Halves a step that takes the last one back.

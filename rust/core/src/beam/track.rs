@@ -1,11 +1,13 @@
 //! States between the holds: short stretches of time with what the holds told of lidars and surface.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix3, Vector3};
 
 use super::adjust::{Adjustment, Gates, Hold, Problem};
 use super::carry::{Knowledge, Spread};
+use super::clocks::ClockNews;
 use super::echoes::Seen;
 use super::family::{self, Loading};
 use super::layout::RANGES;
@@ -25,7 +27,7 @@ const OWN_TIGHTNESS: f64 = 25.0;
 #[derive(Debug, Clone)]
 pub struct Stretch {
     /// What was seen in it.
-    pub seen: Seen,
+    pub seen: Arc<Seen>,
     /// First and last instant, nanoseconds.
     pub span_ns: (i64, i64),
     /// Load at its knots, share of full load; as many as [`load_knots`] gives.
@@ -154,6 +156,9 @@ impl Adjustment {
             part.values[sway + k] = (load - middle) / LOAD_SHARE;
         }
         part.expected = part.values.clone();
+        if let Some(clocks) = &self.clocks {
+            part.set_clocks(clocks);
+        }
     }
 
     /// What became of the data, and states at instants: per instant and section x, y, z in metres and
@@ -170,10 +175,11 @@ impl Adjustment {
         gates: &[Gates],
     ) -> Result<Followed, BeamError> {
         for gate in &gates[..gates.len() - 1] {
-            self.step(gate)?;
+            self.slope_step(gate)?;
         }
         let (normal, tally) = self.last_step(&gates[gates.len() - 1])?;
         let factor = self.free_factor(&normal)?;
+        let known = factor.inverse();
         let (knowledge, posed) = (reference.1, self.posed(0));
         let at = |time_ns: i64| self.states_at(&knowledge.rests, &posed, 0, time_ns);
         let told = match times_ns.get(times_ns.len() / 2) {
@@ -186,13 +192,14 @@ impl Adjustment {
             None => Vec::new(),
         };
         let mut found = Followed {
+            clocks: self.clock_news(&known),
             tally,
             values: Vec::new(),
             spreads: Vec::new(),
         };
         for time_ns in times_ns {
             let (values, rows) = at(*time_ns);
-            let noise = self.noise(&factor, &rows);
+            let noise = self.noise(&known, &rows);
             let parts = told.iter().zip(noise);
             found
                 .spreads
@@ -224,10 +231,11 @@ impl Adjustment {
         block.cholesky().ok_or(BeamError::Singular)
     }
 
-    /// Covariance of the place and variance of the twist of each section by the data of the stretch.
-    fn noise(&self, factor: &Cholesky<f64, Dyn>, rows: &DMatrix<f64>) -> Vec<(Matrix3<f64>, f64)> {
+    /// Covariance of the place and variance of the twist of each section by the data of the stretch, which
+    /// leave the free unknowns a covariance.
+    fn noise(&self, known: &DMatrix<f64>, rows: &DMatrix<f64>) -> Vec<(Matrix3<f64>, f64)> {
         let free = rows.rows(self.free.start, self.free.len()).into_owned();
-        let answer = factor.solve(&free);
+        let answer = known * &free;
         let of = |k: usize| {
             let block = free.columns(4 * k, 4).tr_mul(&answer.columns(4 * k, 4));
             (block.fixed_view::<3, 3>(0, 0).into_owned(), block[(3, 3)])
@@ -262,6 +270,8 @@ pub struct Followed {
     pub values: Vec<[f64; 4]>,
     /// How well they are known.
     pub spreads: Vec<Spread>,
+    /// What it tells of the clocks; none where it tells nothing.
+    pub clocks: Option<ClockNews>,
 }
 
 /// Holds whose loads lie on both sides of a load, and the share of the way between them.

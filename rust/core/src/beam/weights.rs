@@ -79,13 +79,10 @@ pub struct EdgeMet {
 }
 
 impl Weights {
-    /// Takes from the residuals the noise of each lidar and, once the blade is found, what neighbouring
+    /// Takes from the residuals about a blade that is found the noise of each lidar and what neighbouring
     /// data have in common: before, they have in common that it is elsewhere.
-    pub fn learn(&mut self, tallies: &[Tally], is_found: bool) {
+    pub fn learn(&mut self, tallies: &[Tally]) {
         self.learn_noise(tallies);
-        if !is_found {
-            return;
-        }
         self.surface_m = common::surface_m(tallies, &self.noise_m, self.surface_m);
         let of = |tally| Common::of(tally, &self.noise_m);
         self.common = tallies.iter().map(of).collect();
@@ -114,6 +111,11 @@ impl Weights {
 /// Share of its weight that a value keeps beyond a few of its deviations.
 pub(super) fn let_go(value: f64, sigma: f64) -> f64 {
     robust(value, sigma, 0.0)
+}
+
+/// Share of its weight that a datum keeps: whole up to the first value, none from the second on.
+pub(super) fn faded(value: f64, (whole, none): (f64, f64)) -> f64 {
+    ((none - value) / (none - whole)).clamp(0.0, 1.0)
 }
 
 /// Weight of a residual: it fades beyond a few standard deviations, later while the gate is wide.

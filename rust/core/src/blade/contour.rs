@@ -1,7 +1,5 @@
 //! Extremes of scan lines: samples of the leading and the trailing edge (step 7).
 
-use std::collections::BTreeMap;
-
 use nalgebra::{Unit, Vector3};
 
 /// Both ends of one scan line along the chord, metres, world frame.
@@ -15,6 +13,9 @@ pub struct LineExtremes {
     pub trailing_m: [f64; 3],
 }
 
+/// Place along the chord, and the echo.
+type Extreme = (f64, [f64; 3]);
+
 /// The echoes of each ring that lie farthest along `leading_edge` and against it, ring by ring.
 ///
 /// The extreme echo lies inside the true edge by up to one angular step and outside by half the
@@ -24,13 +25,13 @@ pub fn line_extremes(
     rings: &[u16],
     leading_edge: &Unit<Vector3<f64>>,
 ) -> Vec<LineExtremes> {
-    let mut lines: BTreeMap<u16, [(f64, [f64; 3]); 2]> = BTreeMap::new();
+    let count = rings.iter().max().map_or(0, |last| usize::from(*last) + 1);
+    let mut lines: Vec<Option<[Extreme; 2]>> = vec![None; count];
     for (point, ring) in points_m.iter().zip(rings) {
         let point = point.map(f64::from);
         let along = leading_edge.dot(&Vector3::from(point));
-        let [leading, trailing] = lines
-            .entry(*ring)
-            .or_insert([(f64::NEG_INFINITY, point), (f64::INFINITY, point)]);
+        let [leading, trailing] = lines[usize::from(*ring)]
+            .get_or_insert([(f64::NEG_INFINITY, point), (f64::INFINITY, point)]);
         if along > leading.0 {
             *leading = (along, point);
         }
@@ -38,12 +39,15 @@ pub fn line_extremes(
             *trailing = (along, point);
         }
     }
-    let both = |(ring, [leading, trailing]): (u16, [(f64, [f64; 3]); 2])| LineExtremes {
+    let both = |(ring, [leading, trailing]): (u16, [Extreme; 2])| LineExtremes {
         ring,
         leading_m: leading.1,
         trailing_m: trailing.1,
     };
-    lines.into_iter().map(both).collect()
+    let drawn = (0..)
+        .zip(lines)
+        .filter_map(|(ring, line)| Some((ring, line?)));
+    drawn.map(both).collect()
 }
 
 #[cfg(test)]

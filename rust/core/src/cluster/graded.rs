@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::NOISE;
 use super::components::Components;
-use super::grid::Grid;
+use super::grid::{Grid, Reach};
 use crate::neighbors::{Coordinate, squared_distance};
 
 /// Radii may differ by so much: cells hold the more strangers of a point the smaller its radius is.
@@ -46,7 +46,7 @@ struct Scene<T> {
 }
 
 impl<T: Coordinate> Scene<T> {
-    /// One value per sorted point from the runs of cells around it, blocks of cells in parallel.
+    /// One value per sorted point from the runs of points around it, blocks of bricks in parallel.
     fn per_point<V: Send + Clone>(
         &self,
         empty: V,
@@ -57,14 +57,20 @@ impl<T: Coordinate> Scene<T> {
         let pieces = self.grid.split(&mut values, &blocks);
         let work: Vec<_> = blocks.into_iter().zip(pieces).collect();
         work.into_par_iter().for_each(|(block, piece)| {
-            let first = self.grid.members(block.start).start;
-            let mut walk = self.grid.walk(block.start);
-            for cell in block {
-                let runs = walk.around(cell);
-                for i in self.grid.members(cell) {
-                    piece[i - first] = value(i, runs);
+            let first = self.grid.members_of(&block).start;
+            let mut runs = Vec::new();
+            self.grid.walk(block, |cell, around| {
+                let members = self.grid.members(cell.number);
+                runs.clear();
+                runs.push(members.clone());
+                around.any(cell, |other| {
+                    append(&mut runs, self.grid.members(other));
+                    false
+                });
+                for i in members {
+                    piece[i - first] = value(i, &runs);
                 }
-            }
+            });
         });
         values
     }
@@ -76,7 +82,7 @@ impl<T: Coordinate> Scene<T> {
             let is_near = |q: &&[T; 3]| squared_distance(point, **q) <= limit;
             let mut count = 0;
             for run in runs {
-                for batch in self.grid.points[self.grid.members_of(run)].chunks(BATCH) {
+                for batch in self.grid.points[run.clone()].chunks(BATCH) {
                     count += batch.iter().filter(is_near).count();
                     if count >= self.needed {
                         return true;
@@ -91,19 +97,20 @@ impl<T: Coordinate> Scene<T> {
     fn connect(&self, cores: &[bool]) -> Components {
         let components = Components::new(self.grid.points.len());
         self.grid.blocks().into_par_iter().for_each(|block| {
-            let mut walk = self.grid.walk(block.start);
-            for cell in block {
-                let members = self.grid.members(cell);
+            self.grid.walk(block, |cell, around| {
+                let members = self.grid.members(cell.number);
                 for i in members.clone().filter(|&i| cores[i]) {
                     self.connect_one(i, i + 1..members.end, cores, &components);
                 }
-                for run in walk.after(cell).filter(|run| !run.is_empty()) {
-                    let others = self.grid.members_of(&run);
-                    for i in members.clone().filter(|&i| cores[i]) {
-                        self.connect_one(i, others.clone(), cores, &components);
-                    }
+                for reach in [Reach::Touching, Reach::Farther] {
+                    around.each_after(cell, reach, |other| {
+                        let others = self.grid.members(other);
+                        for i in members.clone().filter(|&i| cores[i]) {
+                            self.connect_one(i, others.clone(), cores, &components);
+                        }
+                    });
                 }
-            }
+            });
         });
         components
     }
@@ -152,12 +159,20 @@ impl<T: Coordinate> Scene<T> {
             let reaches = |&j: &usize| {
                 cores[j] && squared_distance(self.grid.points[j], point) <= self.limits[j]
             };
-            let around = runs.iter().flat_map(|run| self.grid.members_of(run));
+            let around = runs.iter().cloned().flatten();
             around
                 .filter(reaches)
                 .map(|j| core_labels[j])
                 .min()
                 .unwrap_or(NOISE)
         })
+    }
+}
+
+/// Adds a run of points, to the last one where it goes on there.
+fn append(runs: &mut Vec<Range<usize>>, next: Range<usize>) {
+    match runs.last_mut() {
+        Some(last) if last.end == next.start => last.end = next.end,
+        _ => runs.push(next),
     }
 }

@@ -1,11 +1,15 @@
 //! Which points belong together: clusters by density, and contour pieces on one line.
 
+mod bricks;
 mod components;
+mod cores;
 pub mod dbscan;
 mod graded;
 mod grid;
+mod lattice;
 pub mod line;
 pub mod radius;
+mod radix;
 mod uniform;
 mod varied;
 

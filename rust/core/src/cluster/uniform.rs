@@ -6,8 +6,10 @@ use rayon::prelude::*;
 
 use super::NOISE;
 use super::components::Components;
-use super::grid::{Grid, Walk};
+use super::cores::CellCores;
+use super::grid::{Around, Cell, Grid, Reach};
 use crate::neighbors::{Coordinate, squared_distance};
+use crate::simd::{Kernel, vectorized};
 
 /// Distances computed between two looks at whether the count is full.
 const BATCH: usize = 16;
@@ -32,7 +34,10 @@ pub fn dbscan_uniform<T: Coordinate>(
         needed,
     };
     let cores = scene.find_cores();
-    let cell_labels = scene.number(&scene.connect(&cores), &cores);
+    let in_cells = scene.cores_in_cells(&cores);
+    let components = scene.connect(&cores, &in_cells);
+    let cell_labels = scene.number(&components, &in_cells);
+    drop(in_cells);
     let sorted_labels = scene.label(&cores, &cell_labels);
     Some(scene.grid.unsorted(&sorted_labels))
 }
@@ -44,7 +49,7 @@ struct Scene<T> {
 }
 
 impl<T: Coordinate> Scene<T> {
-    /// Fills one value per sorted point, blocks of cells in parallel.
+    /// Fills one value per sorted point, blocks of bricks in parallel.
     fn per_point<V: Send + Clone>(
         &self,
         empty: V,
@@ -62,143 +67,124 @@ impl<T: Coordinate> Scene<T> {
     /// Whether each sorted point is a core.
     fn find_cores(&self) -> Vec<bool> {
         self.per_point(false, |block, cores| {
-            let first = self.grid.members(block.start).start;
-            let mut walk = self.grid.walk(block.start);
-            let mut counts = Vec::new();
-            for cell in block {
-                let members = self.grid.members(cell);
-                if members.len() < self.needed {
-                    self.count_around(cell, &mut walk, &mut counts);
-                } else {
-                    counts.clear();
-                    counts.resize(members.len(), self.needed);
-                }
-                for (i, count) in members.zip(&counts) {
-                    cores[i - first] = *count >= self.needed;
-                }
-            }
+            vectorized(FindCores {
+                scene: self,
+                block,
+                cores,
+            });
         })
     }
 
-    /// Counts the neighbours of the points of a cell, nearest rows first, until all have enough.
-    fn count_around(&self, cell: usize, walk: &mut Walk<'_>, counts: &mut Vec<usize>) {
-        let members = self.grid.members(cell);
+    /// Counts the neighbours of the points of a cell, nearest cells first, until all have enough.
+    #[inline(always)]
+    fn count_around(&self, cell: Cell, around: &Around<'_>, counts: &mut Vec<usize>) {
+        let members = self.grid.members(cell.number);
         counts.clear();
         counts.resize(members.len(), members.len()); // all of the cell, and the point itself
-        let mut rows = walk.rows(cell);
-        let own = rows.next().unwrap_or(cell..cell + 1);
-        let runs = [own.start..cell, cell + 1..own.end].into_iter().chain(rows);
-        for run in runs.filter(|run| !run.is_empty()) {
-            let others = &self.grid.points[self.grid.members_of(&run)];
+        around.any(cell, |other| {
+            let others = &self.grid.points[self.grid.members(other)];
             let mut all_full = true;
-            for (i, count) in members.clone().zip(counts.iter_mut()) {
-                self.count_among(self.grid.points[i], others, count);
+            for (point, count) in self.grid.points[members.clone()].iter().zip(&mut *counts) {
+                self.count_among(*point, others, count);
                 all_full &= *count >= self.needed;
             }
-            if all_full {
-                return;
-            }
-        }
+            all_full
+        });
     }
 
+    #[inline(always)]
     fn count_among(&self, point: [T; 3], others: &[[T; 3]], count: &mut usize) {
         for batch in others.chunks(BATCH) {
             if *count >= self.needed {
                 return;
             }
-            let is_near = |q: &&[T; 3]| squared_distance(point, **q) <= self.limit;
-            *count += batch.iter().filter(is_near).count();
+            for other in batch {
+                *count += usize::from(squared_distance(point, *other) <= self.limit);
+            }
         }
     }
 
+    /// The cores of every cell.
+    fn cores_in_cells(&self, cores: &[bool]) -> Vec<CellCores<T>> {
+        let of = |cell: usize| CellCores::of(&self.grid.points, self.grid.members(cell), cores);
+        (0..self.grid.cells()).map(of).collect()
+    }
+
     /// Joins cells that have cores within the radius of each other.
-    fn connect(&self, cores: &[bool]) -> Components {
+    fn connect(&self, cores: &[bool], in_cells: &[CellCores<T>]) -> Components {
         let components = Components::new(self.grid.cells());
-        let has_core: Vec<bool> = (0..self.grid.cells())
-            .map(|cell| self.grid.members(cell).any(|i| cores[i]))
-            .collect();
-        self.grid.blocks().into_par_iter().for_each(|block| {
-            let mut walk = self.grid.walk(block.start);
-            for cell in block.filter(|&cell| has_core[cell]) {
-                let mut root = components.root(cell as u32);
-                for run in walk.after(cell) {
-                    for other in run.filter(|&other| has_core[other]) {
-                        let is_new = !components.is_under(root, other as u32);
-                        if is_new && self.cells_touch(cell, other, cores) {
-                            components.join(cell as u32, other as u32);
-                            root = components.root(root);
-                        }
-                    }
-                }
-            }
-        });
+        // Cells that touch come first: nearly all others hang together by then and need no distances.
+        for reach in [Reach::Touching, Reach::Farther] {
+            self.grid.blocks().into_par_iter().for_each(|block| {
+                vectorized(Connect {
+                    scene: self,
+                    block,
+                    reach,
+                    cores,
+                    in_cells,
+                    components: &components,
+                });
+            });
+        }
         components
     }
 
     /// Whether two cells have a pair of cores within the radius.
-    fn cells_touch(&self, a: usize, b: usize, cores: &[bool]) -> bool {
-        let (a, b) = (self.grid.members(a), self.grid.members(b));
-        let is_near = |i: usize, j: usize| {
-            squared_distance(self.grid.points[i], self.grid.points[j]) <= self.limit
-        };
-        if a.len() * b.len() <= FEW_PAIRS {
-            return a
-                .filter(|&i| cores[i])
-                .any(|i| b.clone().any(|j| cores[j] && is_near(i, j)));
+    #[inline(always)]
+    fn cells_touch(&self, cells: [usize; 2], cores: &[bool], in_cells: &[CellCores<T>]) -> bool {
+        let [a, b] = cells.map(|cell| &in_cells[cell]);
+        if self.is_near(a.first as usize, b.first as usize) {
+            return true; // mostly the first pair tells
         }
-        // Only points that are near the box of the other cell's cores can be in such a pair.
-        let a_near = self.near_box(&a, &b, cores);
-        let b_near = self.near_box(&b, &a, cores);
+        if a.squared_gap(b) > self.limit {
+            return false;
+        }
+        let [a_members, b_members] = cells.map(|cell| self.grid.members(cell));
+        if a_members.len() * b_members.len() <= FEW_PAIRS {
+            return self.points_touch(a_members, b_members, cores);
+        }
+        // Only points that are near the cores of the other cell can be in such a pair.
+        let a_near = self.near(a_members, b, cores);
+        let b_near = self.near(b_members, a, cores);
         a_near
             .iter()
-            .any(|&i| b_near.iter().any(|&j| is_near(i, j)))
+            .any(|&i| b_near.iter().any(|&j| self.is_near(i, j)))
     }
 
-    /// Cores among `points` within the radius of the box around the cores among `others`.
-    fn near_box(&self, points: &Range<usize>, others: &Range<usize>, cores: &[bool]) -> Vec<usize> {
-        let mut low = [f64::INFINITY; 3];
-        let mut high = [f64::NEG_INFINITY; 3];
-        for j in others.clone().filter(|&j| cores[j]) {
-            for k in 0..3 {
-                low[k] = low[k].min(self.grid.points[j][k].into());
-                high[k] = high[k].max(self.grid.points[j][k].into());
-            }
-        }
-        let is_near = |&i: &usize| {
-            let p = crate::neighbors::wide(self.grid.points[i]);
-            let on_box = std::array::from_fn(|k| p[k].clamp(low[k], high[k]));
-            squared_distance(p, on_box) <= self.limit
-        };
-        points
-            .clone()
-            .filter(|&i| cores[i])
-            .filter(is_near)
-            .collect()
+    #[inline(always)]
+    fn is_near(&self, i: usize, j: usize) -> bool {
+        squared_distance(self.grid.points[i], self.grid.points[j]) <= self.limit
+    }
+
+    #[inline(always)]
+    fn points_touch(&self, a: Range<usize>, b: Range<usize>, cores: &[bool]) -> bool {
+        a.filter(|&i| cores[i])
+            .any(|i| b.clone().any(|j| cores[j] && self.is_near(i, j)))
+    }
+
+    /// Cores among `points` within the radius of the box around others.
+    fn near(&self, points: Range<usize>, others: &CellCores<T>, cores: &[bool]) -> Vec<usize> {
+        let is_near = |&i: &usize| others.squared_gap_to(self.grid.points[i]) <= self.limit;
+        points.filter(|&i| cores[i]).filter(is_near).collect()
     }
 
     /// Label of the cores of every cell: components in the order of their smallest core index.
-    fn number(&self, components: &Components, cores: &[bool]) -> Vec<i32> {
-        let cells = 0..self.grid.cells();
-        let first_core = |cell: usize| self.grid.members(cell).find(|&i| cores[i]);
-        let first_of_root = {
-            let mut first = vec![u32::MAX; cells.len()];
-            for cell in cells.clone() {
-                if let Some(i) = first_core(cell) {
-                    let root = components.root(cell as u32) as usize;
-                    first[root] = first[root].min(self.grid.order[i]);
-                }
-            }
-            first
-        };
+    fn number(&self, components: &Components, in_cells: &[CellCores<T>]) -> Vec<i32> {
+        let with_cores = || (0..in_cells.len()).filter(|&cell| in_cells[cell].has_any());
+        let mut first_of_root = vec![u32::MAX; in_cells.len()];
+        for cell in with_cores() {
+            let first = &mut first_of_root[components.root(cell as u32) as usize];
+            *first = self.grid.order[in_cells[cell].first as usize].min(*first);
+        }
         let is_root = |&cell: &usize| first_of_root[cell] != u32::MAX;
-        let mut roots: Vec<usize> = cells.clone().filter(is_root).collect();
+        let mut roots: Vec<usize> = with_cores().filter(is_root).collect();
         roots.sort_unstable_by_key(|&root| first_of_root[root]);
-        let mut labels = vec![NOISE; cells.len()];
+        let mut labels = vec![NOISE; in_cells.len()];
         for (label, &root) in roots.iter().enumerate() {
             labels[root] = label as i32;
         }
         // A root is the smallest cell of its component, so its label is never overwritten too early.
-        for cell in cells {
+        for cell in with_cores() {
             labels[cell] = labels[components.root(cell as u32) as usize];
         }
         labels
@@ -207,45 +193,135 @@ impl<T: Coordinate> Scene<T> {
     /// Label of every sorted point: that of its cell for a core, else of the lowest cluster in reach.
     fn label(&self, cores: &[bool], cell_labels: &[i32]) -> Vec<i32> {
         self.per_point(NOISE, |block, labels| {
-            let first = self.grid.members(block.start).start;
-            let mut walk = self.grid.walk(block.start);
-            for cell in block {
-                let members = self.grid.members(cell);
-                if members.clone().all(|i| cores[i]) {
-                    labels[members.start - first..members.end - first].fill(cell_labels[cell]);
-                    continue;
-                }
-                let rows = walk.around(cell);
-                for i in members {
-                    labels[i - first] = match cores[i] {
-                        true => cell_labels[cell],
-                        false => self.reached_by(i, rows, cores, cell_labels),
-                    };
-                }
-            }
+            vectorized(Label {
+                scene: self,
+                block,
+                cores,
+                cell_labels,
+                labels,
+            });
         })
     }
 
+    /// Lowest label of the cores that reach a point of a cell.
+    #[inline(always)]
     fn reached_by(
         &self,
-        i: usize,
-        rows: &[Range<usize>],
+        place: usize,
+        own: Cell,
+        around: &Around<'_>,
         cores: &[bool],
         cell_labels: &[i32],
     ) -> i32 {
-        let point = self.grid.points[i];
-        let mut lowest = i32::MAX;
-        for cell in rows.iter().cloned().flatten() {
+        let point = self.grid.points[place];
+        // All points of one cell are neighbours.
+        let mut lowest = Some(cell_labels[own.number]).filter(|label| *label != NOISE);
+        around.each(own, |cell| {
             let label = cell_labels[cell];
-            if label == NOISE || label >= lowest {
-                continue;
+            if label == NOISE || lowest.is_some_and(|lowest| lowest <= label) {
+                return;
             }
             let is_near =
                 |j: usize| cores[j] && squared_distance(point, self.grid.points[j]) <= self.limit;
             if self.grid.members(cell).any(is_near) {
-                lowest = label;
+                lowest = Some(label);
             }
-        }
-        if lowest == i32::MAX { NOISE } else { lowest }
+        });
+        lowest.unwrap_or(NOISE)
+    }
+}
+
+/// Finds the cores of a block.
+struct FindCores<'a, T> {
+    scene: &'a Scene<T>,
+    block: Range<usize>,
+    cores: &'a mut [bool],
+}
+
+impl<T: Coordinate> Kernel for FindCores<'_, T> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let Self {
+            scene,
+            block,
+            cores,
+        } = self;
+        let first = scene.grid.members_of(&block).start;
+        let mut counts = Vec::new();
+        scene.grid.walk(block, |cell, around| {
+            let members = scene.grid.members(cell.number);
+            let own = &mut cores[members.start - first..members.end - first];
+            if members.len() >= scene.needed {
+                return own.fill(true);
+            }
+            scene.count_around(cell, around, &mut counts);
+            for (core, count) in own.iter_mut().zip(&counts) {
+                *core = *count >= scene.needed;
+            }
+        });
+    }
+}
+
+/// Joins the cells of a block with those that follow them.
+struct Connect<'a, T> {
+    scene: &'a Scene<T>,
+    block: Range<usize>,
+    reach: Reach,
+    cores: &'a [bool],
+    in_cells: &'a [CellCores<T>],
+    components: &'a Components,
+}
+
+impl<T: Coordinate> Kernel for Connect<'_, T> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (scene, components) = (self.scene, self.components);
+        scene.grid.walk(self.block, |cell, around| {
+            let has_cores = |cell: usize| self.in_cells[cell].has_any();
+            if !has_cores(cell.number) {
+                return;
+            }
+            let mut root = components.root(cell.number as u32);
+            around.each_after(cell, self.reach, |other| {
+                let is_new = has_cores(other) && !components.is_under(root, other as u32);
+                let pair = [cell.number, other];
+                if is_new && scene.cells_touch(pair, self.cores, self.in_cells) {
+                    components.join(cell.number as u32, other as u32);
+                    root = components.root(root);
+                }
+            });
+        });
+    }
+}
+
+/// Labels the points of a block.
+struct Label<'a, T> {
+    scene: &'a Scene<T>,
+    block: Range<usize>,
+    cores: &'a [bool],
+    cell_labels: &'a [i32],
+    labels: &'a mut [i32],
+}
+
+impl<T: Coordinate> Kernel for Label<'_, T> {
+    type Out = ();
+
+    #[inline(always)]
+    fn run(self) {
+        let (scene, cores, cell_labels) = (self.scene, self.cores, self.cell_labels);
+        let first = scene.grid.members_of(&self.block).start;
+        let labels = self.labels;
+        scene.grid.walk(self.block, |cell, around| {
+            for place in scene.grid.members(cell.number) {
+                labels[place - first] = match cores[place] {
+                    true => cell_labels[cell.number],
+                    false => scene.reached_by(place, cell, around, cores, cell_labels),
+                };
+            }
+        });
     }
 }

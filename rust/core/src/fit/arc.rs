@@ -191,6 +191,13 @@ impl SpaceCurve {
 
     /// Shortest distance of a point from the curve, metres.
     pub fn distance_m(&self, point_m: [f64; 3]) -> f64 {
+        if self
+            .across
+            .iter()
+            .all(|polynomial| polynomial.degree() <= 1)
+        {
+            return self.distance_from_line_m(point_m);
+        }
         let along = point_m[self.axis.indices().0];
         let straight = self.squared_distance(point_m, along).sqrt();
         // No point of the curve farther along than this can be nearer.
@@ -202,6 +209,18 @@ impl SpaceCurve {
         self.refined(point_m, best - step, best + step)
             .sqrt()
             .min(straight)
+    }
+
+    /// The same for a straight line, by the foot of the perpendicular.
+    fn distance_from_line_m(&self, point_m: [f64; 3]) -> f64 {
+        let (along, across) = self.axis.indices();
+        let t_m = point_m[along];
+        let slopes = [0, 1].map(|k| self.across[k].slope(t_m));
+        let asides_m = [0, 1].map(|k| point_m[across[k]] - self.across[k].value(t_m));
+        let speed_squared = 1.0 + slopes[0] * slopes[0] + slopes[1] * slopes[1];
+        let foot_m = (slopes[0] * asides_m[0] + slopes[1] * asides_m[1]) / speed_squared;
+        let [x, y] = [0, 1].map(|k| asides_m[k] - slopes[k] * foot_m);
+        (foot_m * foot_m + x * x + y * y).sqrt()
     }
 
     fn squared_distance(&self, point_m: [f64; 3], t_m: f64) -> f64 {
@@ -297,6 +316,24 @@ mod tests {
         assert!((found - 4.75f64.sqrt()).abs() < 1e-9, "{found}");
         assert_eq!(parabola.distance_m([4.0, 0.0, 2.0]), 0.0);
         assert!((parabola.distance_m([0.0, 3.0, 0.0]) - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn distances_from_a_straight_line_are_those_across_it() {
+        // Along (2, -2, 1) / 3; from a point on it 5 m along (1, 2, 2) / 3 and (2, 1, -2) / 3, both across.
+        let line = curve(&[1.0, 2.0], &[5.0, -2.0]);
+        for across in [[1.0, 2.0, 2.0], [2.0, 1.0, -2.0]] {
+            let at = |k: usize| line.point_m(7.0)[k] + 5.0 / 3.0 * across[k];
+            let found = line.distance_m([at(0), at(1), at(2)]);
+            assert!((found - 5.0).abs() < 1e-12, "{found}");
+        }
+        let constant = curve(&[3.0], &[0.0, 0.0]);
+        assert_eq!(constant.distance_m([3.0, 4.0, 9.0]), 4.0);
+        // The way of a bent curve finds the same: a parabola without its square.
+        let bent = curve(&[1.0, 2.0, 0.0], &[5.0, -2.0]);
+        for point in [[0.3, 2.0, 80.0], [-7.0, 1.0, 3.0], [1.0, 5.0, 0.0]] {
+            assert!((line.distance_m(point) - bent.distance_m(point)).abs() < 1e-7);
+        }
     }
 
     #[test]

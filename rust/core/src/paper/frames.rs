@@ -146,9 +146,12 @@ fn nearest(queue: &mut VecDeque<(Timestamp, Share)>, time: Timestamp, reach_ns: 
 
 /// What a sweep gives to a frame, and its middle. Echoes of a lidar on the move do not count.
 pub fn share_of(sweep: &Sweep, stands: &Stands, pass: &PassThrough) -> (Timestamp, Share) {
+    // Room for all at once; the frame takes a copy of the size that it needs.
     let mut share = Share {
         present: true,
-        ..Share::default()
+        points_m: Vec::with_capacity(sweep.cloud.len()),
+        rings: Vec::with_capacity(sweep.cloud.len()),
+        lost_on_blade: false,
     };
     let mut seen: Option<Gap> = None; // first and last shot that passed
     for (index, xyz) in sweep.cloud.xyz_m.iter().enumerate() {

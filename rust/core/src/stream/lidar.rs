@@ -191,7 +191,8 @@ impl Lidar {
             self.pending.push(gap);
         }
         head.arcs().for_each(|arc| self.view.observe(arc));
-        if self.view.turns() >= VIEW_TURNS || self.pending.len() > MAX_PENDING {
+        let is_known = || self.view.turns() >= VIEW_TURNS;
+        if !self.pending.is_empty() && (self.pending.len() > MAX_PENDING || is_known()) {
             self.settle(shared);
         }
         self.count(ordered, tally, time, shared);

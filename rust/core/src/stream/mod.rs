@@ -5,6 +5,7 @@
 
 mod arrivals;
 mod cut;
+mod keys;
 mod lidar;
 mod points;
 mod probe;

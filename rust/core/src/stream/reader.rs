@@ -1,6 +1,6 @@
 //! The second pass over a capture: sweeps of all lidars, merged, in constant memory.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::VecDeque;
 
 use super::arrivals::{Arrival, Arrivals, Ordered, mark};
 use super::report::{Pause, ScanReport, StreamInfo};
@@ -27,6 +27,9 @@ pub struct SweepOptions {
     pub cut_azimuth_rad: Vec<f64>,
     /// Bearings in the sensor frame, by number of the lidar: returns outside may be left out, for speed.
     pub bearings: Vec<Option<Arc>>,
+    /// One turn in so many is wanted, by number of the lidar: returns of others may be left out, for speed. Those whose
+    /// number is a multiple of it have all of theirs.
+    pub every: Vec<u32>,
     /// Packets before this are left out.
     pub start: Option<Timestamp>,
     /// Packets from this on are left out.
@@ -69,6 +72,11 @@ pub trait Sink {
     /// For the lidar with this number; `visible_rad` is the angle of the turn that it sends.
     fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self;
 
+    /// Whether a packet may have returns of a turn whose number is a multiple of `every`.
+    fn is_in_turn(&self, _packet: &Placed, _every: u32) -> bool {
+        true
+    }
+
     /// A packet whose returns are not wanted.
     fn skip(&mut self, packet: &Placed);
 
@@ -85,7 +93,7 @@ pub type SweepReader = Reader<SweepCutter>;
 /// Decodes the datagrams of a capture that was scanned; what becomes of the returns is up to `S`.
 pub struct Reader<S: Sink> {
     options: ScanOptions,
-    lanes: HashMap<StreamKey, Lane<S>>,
+    lanes: Vec<Lane<S>>, // few: looked through for every datagram
     pub(super) out: S::Out,
     decoded: Decoded,
     limits: Limits,
@@ -99,6 +107,7 @@ struct Limits {
 }
 
 struct Lane<S> {
+    key: StreamKey,
     number: usize,
     model: ModelRef,
     is_named: bool,
@@ -107,6 +116,7 @@ struct Lane<S> {
     clock: ClockModel,
     view: FieldOfView,
     bearings: Option<Arc>,
+    every: u32,
     sink: S,
     spare: Vec<Vec<u8>>,
     /// A packet whose last firing may go on in the next one.
@@ -122,14 +132,16 @@ impl<S: Sink> Reader<S> {
     /// is known of its unit.
     pub fn new(report: &ScanReport, options: &SweepOptions) -> Result<Self, ReadError> {
         let all: Vec<usize> = (0..report.lidars.len()).collect();
-        let mut lanes = HashMap::new();
+        let mut lanes: Vec<Lane<S>> = Vec::new();
         for number in options.lidars.as_ref().unwrap_or(&all) {
             let info = report.lidars.get(*number).ok_or_else(|| InvalidValue {
                 name: "lidar",
                 expected: format!("a number below {}", report.lidars.len()),
                 found: number.to_string(),
             })?;
-            lanes.insert(info.key, Lane::new(*number, info, options)?);
+            if lanes.iter().all(|lane| lane.number != *number) {
+                lanes.push(Lane::new(*number, info, options)?);
+            }
         }
         Ok(Self {
             options: report.options.clone(),
@@ -146,31 +158,26 @@ impl<S: Sink> Reader<S> {
 
     /// Takes the next datagram.
     pub fn push(&mut self, datagram: &Datagram<'_>) {
-        for packet in packets(datagram) {
-            self.take_packet(&packet);
-        }
-    }
-
-    fn take_packet(&mut self, datagram: &Datagram<'_>) {
         let key = self.options.key(datagram);
-        let Some(lane) = self.lanes.get_mut(&key).filter(|lane| !lane.is_done) else {
+        let Some(lane) = self.lanes.iter_mut().find(|lane| lane.key == key) else {
             return;
         };
-        if !lane.is_data(datagram.payload) {
-            return;
-        }
         let mut step = Step {
             decoded: &mut self.decoded,
             out: &mut self.out,
             limits: self.limits,
             pauses: &self.pauses,
         };
-        lane.push(datagram, &mut step);
+        for packet in packets(datagram) {
+            if !lane.is_done && lane.is_data(packet.payload) {
+                lane.push(&packet, &mut step);
+            }
+        }
     }
 
     /// Whether all lidars have passed the end that was asked for, so that reading on is no use.
     pub fn is_done(&self) -> bool {
-        self.lanes.values().all(|lane| lane.is_done)
+        self.lanes.iter().all(|lane| lane.is_done)
     }
 
     /// The capture has ended: what waits and the sweeps that are not complete come out.
@@ -181,7 +188,7 @@ impl<S: Sink> Reader<S> {
             limits: self.limits,
             pauses: &self.pauses,
         };
-        let mut lanes: Vec<&mut Lane<S>> = self.lanes.values_mut().collect();
+        let mut lanes: Vec<&mut Lane<S>> = self.lanes.iter_mut().collect();
         lanes.sort_by_key(|lane| lane.number);
         for lane in lanes {
             lane.finish(&mut step);
@@ -212,6 +219,7 @@ impl<S: Sink> Lane<S> {
         let cut_rad = options.cut_azimuth_rad.get(number).copied().unwrap_or(0.0);
         let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
         Ok(Self {
+            key: info.key,
             number,
             model: info.model,
             is_named: info.is_named,
@@ -220,6 +228,7 @@ impl<S: Sink> Lane<S> {
             clock: info.clock.clone(),
             view: info.view.clone(),
             bearings: options.bearings.get(number).copied().flatten(),
+            every: options.every.get(number).copied().unwrap_or(1).max(1),
             sink: S::new(number, cut_rad, visible_rad),
             spare: Vec::new(),
             held: None,
@@ -309,16 +318,17 @@ impl<S: Sink> Lane<S> {
             packet: ticket.packet,
             mean_rate_rad_per_ns: ticket.mean_rate_rad_per_ns,
         };
-        if self.is_wanted(payload) {
+        if self.is_wanted(payload, &placed) {
             self.decoder
                 .decode_before(payload, following, place, step.decoded);
         }
         self.sink.push(&placed, step.decoded, step.out);
     }
 
-    fn is_wanted(&self, payload: &[u8]) -> bool {
+    fn is_wanted(&self, payload: &[u8], placed: &Placed) -> bool {
         let meets = |bearings: Arc| self.decoder.may_meet(payload, bearings);
-        self.bearings.is_none_or(meets)
+        let is_in_turn = self.every == 1 || self.sink.is_in_turn(placed, self.every);
+        is_in_turn && self.bearings.is_none_or(meets)
     }
 
     fn finish(&mut self, step: &mut Step<'_, S::Out>) {
@@ -344,7 +354,7 @@ impl Reader<SweepCutter> {
 
     /// Gives the memory of a sweep back for the next ones of its lidar.
     pub fn recycle(&mut self, lidar: usize, cloud: PointCloud<Sensor>) {
-        let mut lanes = self.lanes.values_mut();
+        let mut lanes = self.lanes.iter_mut();
         if let Some(lane) = lanes.find(|lane| lane.number == lidar) {
             lane.sink.recycle(cloud);
         }
@@ -356,6 +366,10 @@ impl Sink for SweepCutter {
 
     fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self {
         SweepCutter::new(lidar, cut_rad, visible_rad)
+    }
+
+    fn is_in_turn(&self, packet: &Placed, every: u32) -> bool {
+        SweepCutter::is_in_turn(self, packet, every)
     }
 
     fn skip(&mut self, packet: &Placed) {

@@ -1,7 +1,9 @@
 //! The first pass over a capture: finds lidars, counts packets, judges clocks. Decodes no points.
 
 use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
 
+use super::keys::KeyHasher;
 use super::lidar::{Lidar, Shared};
 use super::probe::Probe;
 use super::report::{OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
@@ -24,7 +26,7 @@ const MAX_EARLY: usize = 1024;
 #[derive(Debug)]
 pub struct Scan {
     options: ScanOptions,
-    streams: HashMap<StreamKey, Stream>,
+    streams: HashMap<StreamKey, Stream, BuildHasherDefault<KeyHasher>>,
     shared: Shared,
     datagrams: u64,
     unfollowed: u64,
@@ -62,7 +64,7 @@ impl Scan {
     pub fn new(options: ScanOptions) -> Self {
         Self {
             options,
-            streams: HashMap::new(),
+            streams: HashMap::default(),
             shared: Shared::default(),
             datagrams: 0,
             unfollowed: 0,

@@ -4,9 +4,11 @@ use std::sync::atomic::Ordering;
 
 use lidar_deflect_core::beam::adjust::{Adjustment, Gates, Hold, Problem, Stage};
 use lidar_deflect_core::beam::carry::{Knowledge, Spread};
+use lidar_deflect_core::beam::clocks::{ClockNews, Clocks};
 use lidar_deflect_core::beam::family::{Loading, Trust};
 use lidar_deflect_core::beam::rig::Rig;
 use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
+use lidar_deflect_core::beam::solution::Solution;
 use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
 use lidar_deflect_core::beam::weights::{EdgeMet, Tally, Used, Weights};
 use lidar_deflect_core::error::InvalidValue;
@@ -29,8 +31,12 @@ use crate::error::BorderResult;
 #[pyclass(module = "lidar_deflect._native")]
 pub struct BeamAdjustment {
     core: Adjustment,
+    /// At the present estimate, once it is asked for.
+    solution: Option<Solution>,
     /// Of the sections asked for last.
     knowledge: Option<Knowledge>,
+    /// What became of the data in the last step, by hold.
+    tallies: Vec<Tally>,
     threads: Option<usize>,
 }
 
@@ -44,10 +50,10 @@ type Told<'py> = (
 #[pymethods]
 impl BeamAdjustment {
     /// `forces_n` (holds, saddles, 3) in world axes; `rig_prior` and `rig_covariance` of every lidar's
-    /// rotation, translation, elevation, scale and channel offsets.
+    /// rotation, translation, elevation, scale and channel offsets; `clock_s` the deviations of their clocks.
     #[new]
     #[pyo3(signature = (
-        blade, seen, *, spans_ns, forces_n, full_n, poses, channels, rig_prior, rig_covariance, from_m,
+        blade, seen, *, spans_ns, forces_n, full_n, poses, channels, clock_s, rig_prior, rig_covariance, from_m,
         trust, shape_trust, noise_m, surface_m, edge_rad, echoes, threads=None
     ))]
     #[allow(clippy::too_many_arguments)] // keywords of Python
@@ -60,6 +66,7 @@ impl BeamAdjustment {
         full_n: PyReadonlyArray2<'_, f64>,
         poses: PyReadonlyArray3<'_, f64>,
         channels: Vec<usize>,
+        clock_s: Vec<f64>,
         rig_prior: PyReadonlyArray1<'_, f64>,
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
@@ -142,6 +149,7 @@ impl BeamAdjustment {
         let rig = Rig::new(
             poses?,
             channels,
+            clock_s,
             DVector::from_iterator(
                 rig_prior.as_array().len(),
                 rig_prior.as_array().iter().copied(),
@@ -151,18 +159,21 @@ impl BeamAdjustment {
         let core = compute(py, threads, || Adjustment::new(problem, rig, weights))??;
         Ok(Self {
             core,
+            solution: None,
             knowledge: None,
+            tallies: Vec::new(),
             threads,
         })
     }
 
     /// Solves the equilibria of all holds anew.
     fn linearise(&mut self, py: Python<'_>) -> BorderResult<()> {
+        self.solution = None;
         let core = &mut self.core;
         Ok(compute(py, self.threads, || core.linearise())??)
     }
 
-    /// One step with data inside of the gates; what became of them, by hold.
+    /// One step with data inside of the gates.
     fn step<'py>(
         &mut self,
         py: Python<'py>,
@@ -170,7 +181,7 @@ impl BeamAdjustment {
         edge_m: f64,
         stage: &str,
     ) -> BorderResult<Bound<'py, PyDict>> {
-        self.knowledge = None;
+        (self.solution, self.knowledge) = (None, None);
         let core = &mut self.core;
         let gates = Gates {
             echo_m,
@@ -180,11 +191,17 @@ impl BeamAdjustment {
         let step = compute(py, self.threads, || core.step(&gates))??;
         let told = PyDict::new(py);
         told.set_item("largest", step.largest)?;
-        let holds: PyResult<Vec<_>> = step.tallies.iter().map(|t| tally(py, t)).collect();
-        told.set_item("holds", holds?)?;
+        told.set_item("moved_m", step.moved_m)?;
+        self.tallies = step.tallies;
         told.set_item("noise_m", self.core.weights.noise_m.clone())?;
         told.set_item("surface_m", self.core.weights.surface_m)?;
         Ok(told)
+    }
+
+    /// What became of the data in the last step, by hold.
+    fn told<'py>(&self, py: Python<'py>) -> BorderResult<Vec<Bound<'py, PyDict>>> {
+        let holds: PyResult<Vec<_>> = self.tallies.iter().map(|t| tally(py, t)).collect();
+        Ok(holds?)
     }
 
     /// Values (holds * sections, 4) and joint covariance of x, y, z, twist of the sections, to which
@@ -197,13 +214,9 @@ impl BeamAdjustment {
         echo_m: f64,
         edge_m: f64,
     ) -> BorderResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>)> {
-        let gates = Gates {
-            echo_m,
-            edge_m,
-            stage: Stage::All,
-        };
-        let core = &self.core;
-        let (found, knowledge) = compute(py, self.threads, || core.knowledge(&s_m, &gates))??;
+        let threads = self.threads;
+        let (core, solution) = self.solve(py, echo_m, edge_m)?;
+        let (found, knowledge) = compute(py, threads, || core.knowledge(&s_m, solution))?;
         self.knowledge = Some(knowledge);
         let count = found.covariance.nrows();
         let values = found.values.as_flattened().to_vec();
@@ -286,14 +299,29 @@ impl BeamAdjustment {
         })?;
         let hand = |followed: Option<Followed>| -> PyResult<_> {
             let Some(f) = followed else { return Ok(None) };
+            let told = tally(py, &f.tally)?;
+            told.set_item(
+                "clocks",
+                f.clocks.map(|news| clock_news(py, &news)).transpose()?,
+            )?;
             let parts = (
                 arrays::rows(py, f.values)?,
                 spread_rows(py, &f.spreads)?,
-                tally(py, &f.tally)?,
+                told,
             );
             Ok(Some(parts))
         };
         Ok(found.into_iter().map(hand).collect::<PyResult<Vec<_>>>()?)
+    }
+
+    /// What is known of the lidars' clocks in stretches: offsets and deviations in seconds, and whether their
+    /// mean is held, where offsets are looked for.
+    fn set_clocks(&mut self, offset_s: Vec<f64>, deviation_s: Vec<f64>, tied: bool) {
+        self.core.clocks = Some(Clocks {
+            offset_s,
+            deviation_s,
+            tied,
+        });
     }
 
     /// All unknowns, in standard deviations; those of the lidars in their own units.
@@ -309,14 +337,15 @@ impl BeamAdjustment {
     /// Names of what values rest on, and the variance that each gives to x, y, z, the changes dx, dy, dz
     /// and d since the first hold, and the twist, (groups, holds * sections * 8).
     fn budget<'py>(
-        &self,
+        &mut self,
         py: Python<'py>,
         s_m: Vec<f64>,
         echo_m: f64,
         edge_m: f64,
     ) -> BorderResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
-        let gates = last_gates(echo_m, edge_m);
-        let found = compute(py, self.threads, || self.core.budget(&s_m, &gates))??;
+        let threads = self.threads;
+        let (core, solution) = self.solve(py, echo_m, edge_m)?;
+        let found = compute(py, threads, || core.budget(&s_m, solution))?;
         let names = found.groups.iter().map(|group| group.0).collect();
         let values = found.groups.into_iter().flat_map(|group| group.1).collect();
         let count = 8 * s_m.len() * self.core.problem.holds.len();
@@ -326,13 +355,14 @@ impl BeamAdjustment {
     /// By unknown: its group, by how much the data moved it, its standard deviation before and after.
     #[allow(clippy::type_complexity)] // the two that Python unpacks
     fn posterior<'py>(
-        &self,
+        &mut self,
         py: Python<'py>,
         echo_m: f64,
         edge_m: f64,
     ) -> BorderResult<(Vec<&'static str>, Bound<'py, PyArray2<f64>>)> {
-        let gates = last_gates(echo_m, edge_m);
-        let found = compute(py, self.threads, || self.core.posterior(&gates))??;
+        let threads = self.threads;
+        let (core, solution) = self.solve(py, echo_m, edge_m)?;
+        let found = compute(py, threads, || core.posterior(solution))??;
         let names = found.iter().map(|known| known.0).collect();
         let values = found.iter().flat_map(|known| known.1).collect();
         Ok((names, arrays::table(py, values, 3)?))
@@ -341,13 +371,13 @@ impl BeamAdjustment {
     /// Free axial strain of every hold, as if nothing kept its length, and the joint covariance.
     #[allow(clippy::type_complexity)] // the two that Python unpacks
     fn strains<'py>(
-        &self,
+        &mut self,
         py: Python<'py>,
         echo_m: f64,
         edge_m: f64,
     ) -> BorderResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
-        let gates = last_gates(echo_m, edge_m);
-        let (strain, covariance) = compute(py, self.threads, || self.core.strains(&gates))??;
+        let (_, solution) = self.solve(py, echo_m, edge_m)?;
+        let (strain, covariance) = (&solution.strain, &solution.strain_covariance);
         let count = strain.len();
         Ok((
             strain.as_slice().to_vec().into_pyarray(py),
@@ -358,14 +388,15 @@ impl BeamAdjustment {
     /// Outlines of the sections in every hold, (holds * sections * points, 4): x, y, z in metres and
     /// the standard deviation along the normal.
     fn outlines<'py>(
-        &self,
+        &mut self,
         py: Python<'py>,
         s_m: Vec<f64>,
         echo_m: f64,
         edge_m: f64,
     ) -> BorderResult<Bound<'py, PyArray2<f64>>> {
-        let gates = last_gates(echo_m, edge_m);
-        let found = compute(py, self.threads, || self.core.outlines(&s_m, &gates))??;
+        let threads = self.threads;
+        let (core, solution) = self.solve(py, echo_m, edge_m)?;
+        let found = compute(py, threads, || core.outlines(&s_m, solution))?;
         Ok(arrays::rows(py, found)?)
     }
 
@@ -390,6 +421,24 @@ impl BeamAdjustment {
 }
 
 impl BeamAdjustment {
+    /// The normal equations with data inside of the gates, solved unless they are already.
+    fn solve(
+        &mut self,
+        py: Python<'_>,
+        echo_m: f64,
+        edge_m: f64,
+    ) -> BorderResult<(&Adjustment, &Solution)> {
+        let is_same = |s: &Solution| s.gates.echo_m == echo_m && s.gates.edge_m == edge_m;
+        let solution = match self.solution.take().filter(is_same) {
+            Some(solution) => solution,
+            None => {
+                let (core, gates) = (&self.core, last_gates(echo_m, edge_m));
+                compute(py, self.threads, || core.solution(&gates))??
+            }
+        };
+        Ok((&self.core, self.solution.insert(solution)))
+    }
+
     fn known(&self) -> Result<&Knowledge, InvalidValue> {
         self.knowledge.as_ref().ok_or_else(|| InvalidValue {
             name: "sections",
@@ -410,6 +459,22 @@ fn spread_rows<'py>(py: Python<'py>, spreads: &[Spread]) -> PyResult<Bound<'py, 
         entries.chain([spread.twist]).collect::<Vec<f64>>()
     };
     arrays::table(py, spreads.iter().flat_map(of).collect(), 13)
+}
+
+/// Information of the clocks' offsets (lidars, lidars) in 1/s^2, and that times the offsets, 1/s.
+fn clock_news<'py>(
+    py: Python<'py>,
+    news: &ClockNews,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let rows: Vec<Vec<f64>> = news
+        .information
+        .row_iter()
+        .map(|row| row.iter().copied().collect())
+        .collect();
+    Ok((
+        PyArray2::from_vec2(py, &rows)?,
+        news.right.as_slice().to_vec().into_pyarray(py),
+    ))
 }
 
 fn tally<'py>(py: Python<'py>, tally: &Tally) -> PyResult<Bound<'py, PyDict>> {

@@ -1,5 +1,7 @@
 //! Holds out of a capture: scan lines inside a box, with their ends.
 
+use std::sync::Arc;
+
 use lidar_deflect_core::beam::echoes::Seen;
 use lidar_deflect_core::beam::gather::Gather;
 use lidar_deflect_core::frame::WorldFromSensor;
@@ -18,7 +20,7 @@ use crate::error::BorderResult;
 /// What the lidars saw of the blade in a stretch of time.
 #[pyclass(frozen, module = "lidar_deflect._native")]
 pub struct BeamSeen {
-    pub seen: Seen,
+    pub seen: Arc<Seen>,
 }
 
 #[pymethods]
@@ -98,7 +100,9 @@ impl BeamFeed {
             while windows.len() < count
                 && let Some(seen) = self.gather.pop()
             {
-                windows.push(BeamSeen { seen });
+                windows.push(BeamSeen {
+                    seen: Arc::new(seen),
+                });
             }
             if windows.len() == count || self.has_ended {
                 return Ok(windows);

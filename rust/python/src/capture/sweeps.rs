@@ -100,22 +100,27 @@ pub struct SweepIterator {
     feed: Feed,
     reader: SweepReader,
     names: Vec<String>,
+    every: Vec<u32>,
     progress: Option<Py<PyAny>>,
     is_finished: bool,
 }
 
 #[pymethods]
 impl SweepIterator {
-    /// `lidars` are numbers; `names` and `cut_rad` go by number; `start_ns` and `stop_ns` are UTC.
+    /// `lidars` are numbers; `names`, `cut_rad` and `every` go by number; `start_ns` and `stop_ns` are UTC. Of the
+    /// turns those are given whose number is a multiple of `every`.
     #[new]
     #[allow(clippy::too_many_arguments)] // keywords in Python
-    #[pyo3(signature = (scan, *, lidars, names, cut_rad, start_ns=None, stop_ns=None, progress=None))]
+    #[pyo3(signature = (
+        scan, *, lidars, names, cut_rad, every, start_ns=None, stop_ns=None, progress=None
+    ))]
     fn new(
         py: Python<'_>,
         scan: &CaptureScan,
         lidars: Vec<usize>,
         names: Vec<String>,
         cut_rad: Vec<f64>,
+        every: Vec<u32>,
         start_ns: Option<i64>,
         stop_ns: Option<i64>,
         progress: Option<Py<PyAny>>,
@@ -123,6 +128,7 @@ impl SweepIterator {
         let options = SweepOptions {
             lidars: Some(lidars),
             cut_azimuth_rad: cut_rad,
+            every: every.clone(),
             start: start_ns.map(Timestamp),
             stop: stop_ns.map(Timestamp),
             ..SweepOptions::default()
@@ -131,6 +137,7 @@ impl SweepIterator {
             feed: Feed::open(py, &scan.paths)?,
             reader: SweepReader::new(&scan.report, &options)?,
             names,
+            every,
             progress,
             is_finished: false,
         })
@@ -143,6 +150,11 @@ impl SweepIterator {
     fn __next__(&mut self, py: Python<'_>) -> BorderResult<Option<Sweep>> {
         loop {
             if let Some(sweep) = self.reader.pop() {
+                let every = self.every.get(sweep.lidar).copied().unwrap_or(1).max(1);
+                if !sweep.index.is_multiple_of(every) {
+                    self.reader.recycle(sweep.lidar, sweep.cloud);
+                    continue;
+                }
                 let name = self.names.get(sweep.lidar).cloned().unwrap_or_default();
                 return Ok(Some(Sweep::new(py, name, sweep)?));
             }

@@ -106,20 +106,22 @@ impl Lanes {
         return_kind: ReturnKind,
         out: &mut Decoded,
     ) {
-        let mut hits = [Hit::default(); CHANNELS];
-        let mut count = 0;
-        for (shot, echo) in (0..).zip(echoes) {
-            hits[count] = Hit {
-                shot,
-                place: 0,
-                return_kind,
-            };
-            count += usize::from(echo.range != 0);
-        }
-        match count {
+        match echoes.iter().filter(|echo| echo.range != 0).count() {
             0 => {}
             CHANNELS => self.keep_all(row, &self.place(row, echoes), return_kind, out),
-            _ => self.keep(&hits[..count], row, &[self.place(row, echoes)], out),
+            _ => {
+                let mut hits = [Hit::default(); CHANNELS];
+                let mut count = 0;
+                for (shot, echo) in (0..).zip(echoes) {
+                    hits[count] = Hit {
+                        shot,
+                        place: 0,
+                        return_kind,
+                    };
+                    count += usize::from(echo.range != 0);
+                }
+                self.keep(&hits[..count], row, &[self.place(row, echoes)], out);
+            }
         }
     }
 

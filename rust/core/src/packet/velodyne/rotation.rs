@@ -9,6 +9,8 @@ const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
 const MAX_ROWS: usize = 12;
 /// Steps back by less than this are jitter of the encoder, not a gap of nearly a turn; 0.01 degree.
 pub const BACKLASH_CENTIDEG: i32 = 100;
+/// Steps may always differ by this from the usual one; 0.01 degree.
+const JITTER_CENTIDEG: i32 = 20;
 
 /// Rows of one packet: the azimuths that it states and the times that follow from them.
 #[derive(Debug, Clone, Copy)]
@@ -42,11 +44,13 @@ impl Rotation {
             rows += 1;
         }
         let steps = steps(&raw[..rows]);
-        let usual = median(&steps[..rows.saturating_sub(1)]);
-        let is_usual = |step: i32| (step - usual).abs() <= usual.abs() / 2 + 20;
-        let normal = steps[..rows.saturating_sub(1)]
-            .iter()
-            .filter(|step| is_usual(**step));
+        let between = &steps[..rows.saturating_sub(1)];
+        // Where all steps are so near to each other none can be far off the usual one.
+        let is_even = spread(between) <= JITTER_CENTIDEG;
+        let usual = if is_even { 0 } else { median(between) };
+        let is_usual =
+            |step: i32| is_even || (step - usual).abs() <= usual.abs() / 2 + JITTER_CENTIDEG;
+        let normal = between.iter().filter(|step| is_usual(**step));
         let (sum, count) = normal.fold((0, 0), |(sum, count), step| (sum + step, count + 1));
         let row_step = f64::from(sum) / f64::from(count.max(1)); // 0.01 degree a row
         let rate = row_step * RAD_PER_CENTIDEG / row_ns as f64;
@@ -144,6 +148,12 @@ fn steps(raw: &[u16]) -> [i32; MAX_ROWS] {
         };
     }
     steps
+}
+
+/// Widest step less the smallest.
+fn spread(steps: &[i32]) -> i32 {
+    let ends = |pick: fn(i32, i32) -> i32| steps.iter().copied().reduce(pick).unwrap_or(0);
+    ends(i32::max) - ends(i32::min)
 }
 
 fn median(steps: &[i32]) -> i32 {

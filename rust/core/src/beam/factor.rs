@@ -1,0 +1,132 @@
+//! A positive matrix as the square of a triangle, block by block: products of blocks go at the speed of the
+//! machine, single columns at that of its memory.
+
+use nalgebra::{DMatrix, DVector};
+
+/// Rows and columns of a block.
+const BLOCK: usize = 64;
+
+/// The lower triangle whose square is the matrix.
+#[derive(Debug, Clone)]
+pub struct Factor {
+    lower: DMatrix<f64>,
+}
+
+impl Factor {
+    /// Of a matrix, of which only the lower triangle is read; `None` where it is not positive.
+    pub fn new(mut matrix: DMatrix<f64>) -> Option<Self> {
+        let size = matrix.nrows();
+        for first in (0..size).step_by(BLOCK) {
+            let width = BLOCK.min(size - first);
+            let mut corner = matrix.view_mut((first, first), (width, width));
+            let triangle = corner.clone_owned().cholesky()?.unpack();
+            corner.copy_from(&triangle);
+            let (rest, below) = (first + width, size - first - width);
+            let mut across = matrix.view((rest, first), (below, width)).transpose();
+            triangle.solve_lower_triangular_mut(&mut across);
+            let down = across.transpose();
+            matrix
+                .view_mut((rest, first), (below, width))
+                .copy_from(&down);
+            for from in (0..below).step_by(BLOCK) {
+                let wide = BLOCK.min(below - from);
+                matrix
+                    .view_mut((rest + from, rest + from), (below - from, wide))
+                    .gemm(
+                        -1.0,
+                        &down.rows(from, below - from),
+                        &across.columns(from, wide),
+                        1.0,
+                    );
+            }
+        }
+        matrix.fill_upper_triangle(0.0, 1);
+        Some(Self { lower: matrix })
+    }
+
+    /// That of the first `count` rows and columns.
+    pub fn first(&self, count: usize) -> Self {
+        Self {
+            lower: self.lower.view((0, 0), (count, count)).into_owned(),
+        }
+    }
+
+    /// The matrix' inverse times a vector.
+    pub fn solve(&self, right: &DVector<f64>) -> DVector<f64> {
+        let mut answer = right.clone();
+        self.lower.solve_lower_triangular_mut(&mut answer);
+        self.lower.tr_solve_lower_triangular_mut(&mut answer);
+        answer
+    }
+
+    /// The matrix' inverse.
+    pub fn inverse(&self) -> DMatrix<f64> {
+        let (size, root) = (self.lower.nrows(), self.inverse_root());
+        let across = root.transpose();
+        let mut inverse = DMatrix::zeros(size, size);
+        for first in (0..size).step_by(BLOCK) {
+            let (width, below) = (BLOCK.min(size - first), size - first);
+            inverse.view_mut((first, first), (below, width)).gemm(
+                1.0,
+                &across.view((first, first), (below, below)),
+                &root.view((first, first), (below, width)),
+                0.0,
+            );
+        }
+        inverse.fill_upper_triangle_with_lower_triangle();
+        inverse
+    }
+
+    /// Inverse of the triangle.
+    fn inverse_root(&self) -> DMatrix<f64> {
+        let size = self.lower.nrows();
+        let mut root = DMatrix::zeros(size, size);
+        for first in (0..size).step_by(BLOCK) {
+            let width = BLOCK.min(size - first);
+            let corner = self.lower.view((first, first), (width, width));
+            let mut rows = DMatrix::zeros(width, first + width);
+            rows.view_mut((0, first), (width, width)).fill_diagonal(1.0);
+            let before = self.lower.view((first, 0), (width, first));
+            rows.columns_mut(0, first)
+                .gemm(-1.0, &before, &root.view((0, 0), (first, first)), 0.0);
+            corner.solve_lower_triangular_mut(&mut rows);
+            root.view_mut((first, 0), (width, first + width))
+                .copy_from(&rows);
+        }
+        root
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: usize = 150;
+
+    /// Positive, and no two entries alike.
+    fn positive() -> DMatrix<f64> {
+        let root = DMatrix::from_fn(SIZE, SIZE, |i, j| ((i * SIZE + j) as f64 * 0.7).sin());
+        &root * root.transpose() + DMatrix::identity(SIZE, SIZE) * 5.0
+    }
+
+    #[test]
+    fn what_is_solved_and_inverted_gives_the_matrix_back() {
+        let matrix = positive();
+        let mut half = matrix.clone();
+        half.fill_upper_triangle(f64::NAN, 1);
+        let factor = Factor::new(half).unwrap();
+        let right = DVector::from_fn(SIZE, |i, _| i as f64 - 70.0);
+        assert!((&matrix * factor.solve(&right) - &right).amax() < 1e-8);
+        let one = &matrix * factor.inverse();
+        assert!((one - DMatrix::identity(SIZE, SIZE)).amax() < 1e-9);
+        let part = matrix.view((0, 0), (70, 70)) * factor.first(70).inverse();
+        assert!((part - DMatrix::identity(70, 70)).amax() < 1e-9);
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_has_none() {
+        let mut matrix = positive();
+        matrix[(140, 140)] = -1.0;
+        assert!(Factor::new(matrix).is_none());
+    }
+}

@@ -1,0 +1,268 @@
+//! Sums over the rows of one hold, in two steps.
+//!
+//! A state moves a contact by way of the two nodes beside it alone. So rows are summed with the six
+//! moves of each node in the place of the many unknowns of the state, and the sums are taken to these
+//! at the end, once per node instead of once per row. Rows that touch the same unknowns follow each
+//! other on a scan line: they are collected in a panel and multiplied together.
+
+use std::ops::Range;
+
+use nalgebra::DMatrix;
+
+use super::panel::Panel;
+
+/// Moves of a node: three rotations, three displacements.
+pub const MOVES: usize = 6;
+/// Moves of both nodes of an element.
+pub const BOTH: usize = 2 * MOVES;
+/// An unknown that is not summed.
+const NOWHERE: usize = usize::MAX;
+
+/// One row: how what is to be explained answers to the nodes of an element and to unknowns.
+#[derive(Debug, Clone, Copy)]
+pub struct Row<'a> {
+    /// Inner node of the element.
+    pub node: usize,
+    /// By its moves and those of the outer node.
+    pub moves: [f64; BOTH],
+    /// By unknowns that are not of the state.
+    pub others: &'a [(usize, f64)],
+    /// What is to be explained.
+    pub residual: f64,
+    /// Inverse variance.
+    pub weight: f64,
+}
+
+/// Sums of weighted rows of one hold. Place 0 of others is the residual.
+#[derive(Debug)]
+pub struct Sums {
+    start: usize,
+    /// By unknown, from `start` on.
+    places: Vec<usize>,
+    /// Unknowns at the places from 1 on.
+    others: Vec<usize>,
+    /// A node's moves with each other, lower triangle, and below with those of the next node: a column
+    /// per move.
+    near: DMatrix<f64>,
+    /// Others with moves: a column per move.
+    cross: DMatrix<f64>,
+    /// Others with each other; each product once, on either side of the diagonal.
+    own: DMatrix<f64>,
+    panel: Panel,
+    touched: Vec<usize>,
+    values: Vec<f64>,
+    rows: usize,
+}
+
+/// Sums of one hold by its unknowns, those of the state first. Only the lower triangle counts.
+#[derive(Debug)]
+pub struct Part {
+    /// Which unknowns.
+    pub unknowns: Vec<usize>,
+    /// Sum of row^T weight row.
+    pub matrix: DMatrix<f64>,
+    /// Sum of row^T weight residual.
+    pub right: Vec<f64>,
+    /// Weighted sum of squared residuals.
+    pub cost: f64,
+    /// Rows.
+    pub rows: usize,
+}
+
+impl Sums {
+    /// Of rows at `nodes` nodes that touch `unknowns` beside the state; of these the ones in `free` are summed.
+    pub fn new(nodes: usize, unknowns: impl Iterator<Item = usize>, free: &Range<usize>) -> Self {
+        let others: Vec<usize> = unknowns.filter(|i| free.contains(i)).collect();
+        let mut places = vec![NOWHERE; free.len()];
+        for (place, unknown) in others.iter().enumerate() {
+            places[unknown - free.start] = place + 1;
+        }
+        let size = others.len() + 1;
+        Self {
+            near: DMatrix::zeros(BOTH, MOVES * nodes),
+            cross: DMatrix::zeros(size, MOVES * nodes),
+            own: DMatrix::zeros(size, size),
+            panel: Panel::default(),
+            touched: Vec::new(),
+            values: Vec::new(),
+            rows: 0,
+            start: free.start,
+            places,
+            others,
+        }
+    }
+
+    /// Adds one row.
+    pub fn add(&mut self, row: &Row) {
+        self.touched.clear();
+        self.touched.push(0);
+        self.values.clear();
+        self.values.push(row.residual);
+        for (unknown, slope) in row.others {
+            let known = unknown
+                .checked_sub(self.start)
+                .and_then(|i| self.places.get(i));
+            if let Some(place) = known.filter(|place| **place != NOWHERE) {
+                self.touched.push(*place);
+                self.values.push(*slope);
+            }
+        }
+        if !self.panel.suits(row.node, &self.touched) {
+            self.flush();
+            self.panel.begin(row.node, &self.touched, BOTH);
+        }
+        let values = row.moves.iter().chain(&self.values).copied();
+        self.panel.push(values, row.weight.sqrt());
+        self.rows += 1;
+    }
+
+    /// Adds the products of the panel where they belong.
+    fn flush(&mut self) {
+        if self.panel.is_empty() {
+            return;
+        }
+        let mut panel = std::mem::take(&mut self.panel);
+        let (first, places) = (MOVES * panel.node, std::mem::take(&mut panel.places));
+        for (i, line) in panel.multiply().take(BOTH + places.len()).enumerate() {
+            let (moves, others) = line.split_at(BOTH);
+            if i < BOTH {
+                self.add_move(first + i, i, moves, (&places, others));
+            } else {
+                self.add_other(i - BOTH, &places, others);
+            }
+        }
+        panel.places = places;
+        self.panel = panel;
+    }
+
+    /// Adds the products of one move, the `i`-th of both nodes, with those after it and with others.
+    fn add_move(&mut self, column: usize, i: usize, moves: &[f64], others: (&[usize], &[f64])) {
+        // The outer node has columns of its own.
+        let own = if i < MOVES { 0 } else { MOVES };
+        let mut near = self.near.column_mut(column);
+        (i..BOTH).for_each(|k| near[k - own] += moves[k]);
+        scatter(&mut self.cross, column, others.0, others.1);
+    }
+
+    /// Adds the products of the `i`-th other with those after it.
+    fn add_other(&mut self, i: usize, places: &[usize], products: &[f64]) {
+        scatter(&mut self.own, places[i], &places[i..], &products[i..]);
+    }
+
+    /// The sums by unknowns: `state` are those of the state, each with a column of `moves` that says what
+    /// it does to every move.
+    pub fn part(mut self, state: &[usize], moves: &DMatrix<f64>) -> Part {
+        self.flush();
+        let (inner, size) = (state.len(), self.others.len());
+        let mut matrix = DMatrix::zeros(inner + size, inner + size);
+        let states = moves.transpose() * self.near_times(moves);
+        matrix.view_mut((0, 0), (inner, inner)).copy_from(&states);
+        let crossed = &self.cross * moves;
+        let below = crossed.rows(1, size);
+        matrix.view_mut((inner, 0), (size, inner)).copy_from(&below);
+        self.fold();
+        let own = self.own.view((1, 1), (size, size));
+        matrix
+            .view_mut((inner, inner), (size, size))
+            .copy_from(&own);
+        let of_state = crossed.row(0);
+        let of_others = self.own.view((1, 0), (size, 1));
+        Part {
+            unknowns: state.iter().chain(&self.others).copied().collect(),
+            matrix,
+            right: of_state.iter().chain(of_others.iter()).copied().collect(),
+            cost: self.own[(0, 0)],
+            rows: self.rows,
+        }
+    }
+
+    /// Brings the products of others to the lower triangle.
+    fn fold(&mut self) {
+        for j in 0..self.own.ncols() {
+            for i in j + 1..self.own.nrows() {
+                self.own[(i, j)] += self.own[(j, i)];
+            }
+        }
+    }
+
+    /// The products of moves, times `moves`.
+    fn near_times(&self, moves: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut product = DMatrix::zeros(moves.nrows(), moves.ncols());
+        for first in (0..moves.nrows()).step_by(MOVES) {
+            let mut own = self.near.view((0, first), (MOVES, MOVES)).into_owned();
+            own.fill_upper_triangle_with_lower_triangle();
+            let here = moves.rows(first, MOVES);
+            let mut at = product.rows_mut(first, MOVES);
+            at += own * here;
+            if first + MOVES < moves.nrows() {
+                let next = self.near.view((MOVES, first), (MOVES, MOVES));
+                at += next.transpose() * moves.rows(first + MOVES, MOVES);
+                let mut beyond = product.rows_mut(first + MOVES, MOVES);
+                beyond += next * here;
+            }
+        }
+        product
+    }
+}
+
+/// Adds products to some rows of a column.
+fn scatter(sums: &mut DMatrix<f64>, column: usize, rows: &[usize], products: &[f64]) {
+    let count = sums.nrows();
+    let sums = &mut sums.as_mut_slice()[column * count..][..count];
+    for (row, product) in rows.iter().zip(products) {
+        sums[*row] += product;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STATE: [usize; 3] = [1, 2, 7];
+
+    /// Any numbers, evenly spread over (-1, 1).
+    fn number(place: usize) -> f64 {
+        (place as f64 * 0.618_034).fract() * 2.0 - 1.0
+    }
+
+    #[test]
+    fn sums_by_way_of_nodes_are_those_of_whole_rows() {
+        let free = 1..20;
+        let moves = DMatrix::from_fn(MOVES * 4, STATE.len(), |i, j| number(31 * i + 7 * j));
+        let mut sums = Sums::new(4, 8..20, &free);
+        let mut expected = DMatrix::<f64>::zeros(20, 20);
+        let mut right = vec![0.0; 20];
+        for k in 0..200 {
+            let others: Vec<(usize, f64)> = [9, 10 + k / 40, 19, 25]
+                .map(|i| (i, number(k + 13 * i)))
+                .into();
+            let row = Row {
+                node: (k / 50).min(2),
+                moves: std::array::from_fn(|i| number(11 * k + i)),
+                others: &others,
+                residual: number(3 * k),
+                weight: 1.0 + number(5 * k).abs(),
+            };
+            sums.add(&row);
+            let mut whole = vec![0.0; 26];
+            for (j, unknown) in STATE.into_iter().enumerate() {
+                let of = |i: usize| row.moves[i] * moves[(MOVES * row.node + i, j)];
+                whole[unknown] = (0..BOTH).map(of).sum();
+            }
+            others.iter().for_each(|(i, slope)| whole[*i] += slope);
+            for i in 0..20 {
+                right[i] += row.weight * whole[i] * row.residual;
+                (0..20).for_each(|j| expected[(i, j)] += row.weight * whole[i] * whole[j]);
+            }
+        }
+        let part = sums.part(&STATE, &moves);
+        assert_eq!(part.rows, 200);
+        for (i, one) in part.unknowns.iter().enumerate() {
+            assert!((part.right[i] - right[*one]).abs() < 1e-9, "{one}");
+            for (j, two) in part.unknowns[..=i].iter().enumerate() {
+                let error = part.matrix[(i, j)] - expected[(*one, *two)];
+                assert!(error.abs() < 1e-9, "{one} {two}");
+            }
+        }
+    }
+}
