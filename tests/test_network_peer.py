@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 CHANNELS = 8
 PRIORS = (0.02, 3.5e-4, 1e-4)
-POSITION_U_M, MOUNTING_U_RAD, CONTROL_U_M, BEND_U_M = 0.005, 0.17, 0.005, 0.02
+POSITION_U_M, MOUNTING_U_RAD, CONTROL_U_M, BEND_U_M, SLANT_U_M = 0.005, 0.17, 0.005, 0.02, 0.0015
 POSITION_M = np.array([3.0, -5.8, 95.0])
 TRUE = Rotation.from_euler("xyz", [0.02, -0.03, 1.6]).as_matrix()
 SURFACES = (
@@ -94,17 +94,18 @@ class Yard:
     def residuals(
         self, x: NDArray[np.float64], raw: dict[str, Any], rotation: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """All rows over their sigmas at a state: pose, elevation, scale, offsets, coefficients."""
+        """Rows over their sigmas at a state: pose, elevation, scale, offsets, shapes, slant."""
         turned = Rotation.from_rotvec(x[:3]).as_matrix() @ rotation
         position, (elevation, scale) = x[3:6], x[6:8]
         offsets = x[8 : 8 + CHANNELS]
-        bends = x[8 + CHANNELS :].reshape(-1, 6)
+        bends, slant = x[8 + CHANNELS : -1].reshape(-1, 6), x[-1]
         beam, sigma = raw["met_beam"], raw["residuals"][:, 1]
         order = np.lexsort((self.cell, self.ring))[beam]
         level = np.linalg.norm(self.direction[order, :2], axis=1)
         up = np.c_[-self.direction[order, 2:] * self.direction[order, :2] / level[:, None], level]
         ray = self.direction[order] * np.cos(elevation) + up * np.sin(elevation)
         measured = self.range_m[order] * (1.0 + scale) + offsets[self.ring[order]]
+        measured += slant * self._slants(raw)
         meets = self._meets(ray @ turned.T, position, bends, raw["met_surface"], measured)
         rows = [(measured - meets) / sigma]
         for (number, point, _), judged in zip(self.control, raw["control"], strict=True):
@@ -115,7 +116,24 @@ class Yard:
         alike = np.eye(CHANNELS) - np.full((CHANNELS, CHANNELS), 1.0 / (CHANNELS + 1))
         rows.append(np.linalg.cholesky(alike).T @ offsets / raw["offset_u_m"])
         rows.append(bends[:, 3:].ravel() / BEND_U_M)
+        rows.append([slant / SLANT_U_M])
         return np.concatenate(rows)
+
+    def _slants(self, raw: dict[str, Any]) -> NDArray[np.float64]:
+        """1 / cos(incidence) - 1 where each ray ended."""
+        ray = raw["met_xyz_m"] - raw["lidars"][0]["position_m"]
+        ray /= np.linalg.norm(ray, axis=1)[:, None]
+        cosine = np.empty(len(ray))
+        for number, surface in enumerate(SURFACES):
+            mine = raw["met_surface"] == number
+            frame, c = axes(surface), raw["surfaces"][number]["coefficients_m"]
+            u, v, _ = frame @ (raw["met_xyz_m"][mine] - np.array(surface["origin_m"])).T
+            (a, b), x, y = surface["half_m"], u / surface["half_m"][0], v / surface["half_m"][1]
+            slopes = [(c[1] + 2 * c[3] * x + c[4] * y) / a, (c[2] + c[4] * x + 2 * c[5] * y) / b]
+            gradient = frame[2] - np.array(slopes).T @ frame[:2]
+            along = (gradient * ray[mine]).sum(axis=1) / np.linalg.norm(gradient, axis=1)
+            cosine[mine] = np.abs(along)
+        return 1.0 / cosine - 1.0
 
     def _above(
         self, points: NDArray[np.float64], number: int, bend: NDArray[np.float64]
@@ -157,6 +175,7 @@ def test_the_optimum_and_its_covariance_are_those_of_scipy() -> None:
             [lidar["elevation_rad"], lidar["scale"]],
             lidar["offsets_m"],
             *(surface["coefficients_m"] for surface in raw["surfaces"]),
+            [lidar["slant_m"]],
         ]
     )
     arguments = (raw, np.array(lidar["rotation"]))

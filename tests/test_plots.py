@@ -24,6 +24,7 @@ class Result:
     outline: pl.DataFrame | None = None
     points: pl.DataFrame | None = None
     config: dict[str, Any] | None = None
+    calibration: dict[str, Any] | None = None
 
 
 def result(frame: pl.DataFrame | None = None, **more: Any) -> Result:
@@ -199,6 +200,47 @@ def test_the_plan_shows_lidars_and_anchors_where_they_are_known() -> None:
     assert list(trace(figure, "wire anchor").text) == ["W84"]
 
 
+def registered() -> dict[str, Any]:
+    """Two lidars, the first four times as sure along z as along x, and what their rays left."""
+    covariance = np.diag([1e-8] * 3 + [16e-6, 1e-6, 1e-6]).tolist()
+    lidars = [
+        {"id": name, "world_from_sensor": pose_at(3.0, -6.8, z_m), "covariance": covariance}
+        for name, z_m in (("L1", 86.0), ("L2", 94.0))
+    ]
+    cells = {
+        "surface": "ground",
+        "across": "x_m",
+        "lidar": ["L1", "L1", "L2"],
+        "z_m": [86.25, 88.75, 93.75],
+        "across_m": [1.25, 1.25, -3.75],
+        "mean_mm": [0.4, -0.2, 6.0],
+        "rays": [120, 80, 10],
+    }
+    return {"lidars": lidars, "evidence": {"cells": [cells]}}
+
+
+def pose_at(x_m: float, y_m: float, z_m: float) -> list[list[float]]:
+    return [[1.0, 0, 0, x_m], [0, 1.0, 0, y_m], [0, 0, 1.0, z_m], [0, 0, 0, 1.0]]
+
+
+def test_ellipses_of_the_lidars_are_enlarged_by_what_the_legend_says() -> None:
+    figure = Plots(result(calibration=registered())).plan()
+    drawn = [t for t in figure.data if t.legendgroup == "ellipse"]
+    assert len(drawn) == 2
+    times = int(drawn[0].name.split(", ")[1].split()[0])
+    # Semi-axes of 95 %: 2.448 standard deviations, 1 mm along z and 4 mm along x.
+    assert np.ptp(drawn[0].x) == pytest.approx(2 * 2.448e-3 * times, rel=1e-3)
+    assert np.ptp(drawn[0].y) == pytest.approx(2 * 4 * 2.448e-3 * times, rel=1e-3)
+
+
+def test_residuals_of_the_yard_stand_where_their_rays_ended() -> None:
+    plots = Plots(result(calibration=registered()))
+    drawn = [each for each in plots.yard_residuals().data if len(each.x)]
+    found = {(each.name, *each.x): list(each.y) for each in drawn}
+    assert found == {("-1 to 1 mm", 86.25, 88.75): [1.25, 1.25], ("above 3 mm", 93.75): [-3.75]}
+    assert list(trace(plots.lidar_shares(), "ground").y) == [200, 10]
+
+
 DRAWN = (
     "time_series",
     "wires",
@@ -209,6 +251,8 @@ DRAWN = (
     "rotation",
     "plan",
     "pose_uncertainty",
+    "yard_residuals",
+    "lidar_shares",
     "drift",
     "residuals",
     "residual_map",

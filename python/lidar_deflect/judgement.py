@@ -29,6 +29,9 @@ COUPLED = 0.5
 GOOD_RAD, GOOD_M = 1e-3, 6e-3
 """Poses as good as this across ground and walls deserve the verdict."""
 
+CELL_M = 2.5
+"""Residuals of rays are kept as means over squares of this side."""
+
 TURNS = (
     ("about x (pitch along the blade)", "survey ground points that spread along the blade"),
     ("about the vertical (yaw)", 'survey a wall: three or more [[control]] points on = "wall"'),
@@ -257,10 +260,12 @@ def _evidence(config: Config, solution: Solution) -> dict[str, Any]:
             {"name": name, "echoes": seen} for name, seen in seen_by(config, solution).items()
         ],
         "retro_offset_mm": [round(1e3 * lidar["retro_m"], 2) for lidar in solution.raw["lidars"]],
+        "slant_offset_mm": [round(1e3 * lidar["slant_m"], 2) for lidar in solution.raw["lidars"]],
         "surfaces": [
             {"name": surface.name, **_surface(raw)}
             for surface, raw in zip(solution.surfaces, solution.raw["surfaces"], strict=True)
         ],
+        "cells": [_cells(solution, index) for index in range(len(solution.surfaces))],
         "survey": [
             {
                 "what": name,
@@ -271,6 +276,26 @@ def _evidence(config: Config, solution: Solution) -> dict[str, Any]:
             }
             for name, rows in named(config, solution)
         ],
+    }
+
+
+def _cells(solution: Solution, index: int) -> dict[str, Any]:
+    """Mean residuals of one surface by lidar and square, ground seen from above, walls upright."""
+    raw, surface = solution.raw, solution.surfaces[index]
+    is_ground = abs(surface.normal[1]) > 0.5
+    kept = (raw["met_surface"] == index) & np.isfinite(raw["residuals"][:, 0])
+    places = raw["met_xyz_m"][kept][:, [2, 0 if is_ground else 1]]
+    keys = np.c_[raw["met_lidar"][kept], np.floor(places / CELL_M)].astype(np.int64)
+    squares, of, counts = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
+    means = np.bincount(of.ravel(), raw["residuals"][kept, 0]) / counts
+    return {
+        "surface": surface.name,
+        "across": "x_m" if is_ground else "y_m",
+        "lidar": [solution.lidars[number] for number in squares[:, 0]],
+        "z_m": (CELL_M * (squares[:, 1] + 0.5)).tolist(),
+        "across_m": (CELL_M * (squares[:, 2] + 0.5)).tolist(),
+        "mean_mm": (1e3 * means).round(2).tolist(),
+        "rays": counts.tolist(),
     }
 
 

@@ -179,13 +179,19 @@ CAPTIONS = {
         "step; bands are 95 % intervals, marks the sections."
     ),
     "plan": (
-        "The test from above: sections at every load step, lidars, surveyed points, winch ends of "
-        "wires."
+        "The test from above: sections at every load step, lidars with the 95 % ellipse of their "
+        "place (enlarged as the legend says), surveyed points, winch ends of wires."
     ),
     "pose_uncertainty": (
         "Expanded uncertainty (k = 2) of every lidar's pose: 1 mrad about the blade's axis moves "
         "a deflection of 10 m by 10 mm."
     ),
+    "yard_residuals": (
+        "What rays of the unloaded hold leave against ground and walls as adjusted, means over "
+        "2.5 m. Colour that follows one lidar says that it stands elsewhere; colour that all "
+        "lidars share says that the surface is not as it was taken to be."
+    ),
+    "lidar_shares": "Rays by which every lidar holds ground and walls.",
     "drift": "How far every lidar turned and moved since the calibration.",
     "residuals": (
         "Distance of the blade's echoes from the model along the span. A trend in one lidar alone "
@@ -538,6 +544,9 @@ PLOT = {
     "no_other_channel_was_read": "no other channel was read",
     "no_pose_was_watched": "no pose was watched",
     "nothing_has_a_place": "nothing has a place",
+    "ellipse_enlarged": "95 % ellipse, {times} times as large",
+    "no_residuals_of_the_yard": "this calibration keeps no residuals of the yard",
+    "rays": "rays",
     "nothing_was_compared": "nothing was compared",
     "points": "points (1/s)",
     "reading": "reading",

@@ -1,5 +1,7 @@
 """Small yards: two lidars for half a second, with ground, walls or targets that are not ideal.
 
+A bare yard has neither wall nor target: the mounting alone holds the turns about the vertical.
+
 Disturbances come from wider families than an adjustment assumes: heavy tails, roughness that is
 alike over metres, walls that bow and lean, ranges that depend on incidence and brightness.
 """
@@ -14,7 +16,7 @@ import numpy as np
 from lidar_deflect.scene import Scene
 
 FIRST_SEED = {"development": 3_000_000, "verification": 4_000_000}
-YARDS = ("wall", "bent wall", "targets", "rough ground")
+YARDS = ("wall", "bent wall", "targets", "rough ground", "bare")
 SENSORS = ("vlp16", "xt32", "vlp32c", "os1-32")
 NOISE_MM = {"vlp16": 14.0, "xt32": 6.0, "vlp32c": 12.0, "os1-32": 10.0}
 HOLD_S = 0.6
@@ -45,7 +47,8 @@ def case(split: str, number: int) -> Case:
 def scene(case: Case) -> Scene:
     """Return the scene of a yard."""
     random = np.random.default_rng([case.seed, 8])
-    rough = case.yard == "rough ground"
+    swells = random.random() < 0.5 if case.yard == "bare" else False
+    rough = case.yard == "rough ground" or swells
     ground = {
         "height_m": -7.0,
         "slope_x": float(random.normal(0.0, 0.012)),
@@ -67,9 +70,16 @@ def scene(case: Case) -> Scene:
             "incidence_bias_mm": float(random.normal(0.0, 1.0)) if heavy else 0.0,
             "faint_bias_mm": float(random.normal(0.0, 0.7)) if heavy else 0.0,
         },
-        "survey": {"ground_points": 24, "wall_points": 0 if case.yard == "targets" else 8},
+        "survey": _survey(case.yard),
     }
     return Scene.from_document(document | _references(case, ground, random))
+
+
+def _survey(yard: str) -> dict[str, Any]:
+    """Return what is surveyed: without walls and targets more ground, and the sensors better."""
+    if yard == "bare":
+        return {"ground_points": 60, "wall_points": 0, "position_mm": 2.0}
+    return {"ground_points": 24, "wall_points": 0 if yard == "targets" else 8}
 
 
 def _height_m(ground: dict[str, Any], x: float, z: float) -> float:
@@ -92,6 +102,8 @@ def _lidar(
 def _references(case: Case, ground: dict[str, Any], random: np.random.Generator) -> dict[str, Any]:
     if case.yard == "targets":
         return {"targets": _targets(ground, random)}
+    if case.yard == "bare":
+        return {}
     bent = case.yard == "bent wall"
     return {
         "wall": {

@@ -2,7 +2,7 @@
 
 `Plots` holds a result and draws: `series` over time, `load` over the load, `shapes` in space,
 `spans` along the blade, `places` of the yard, `quality` of the comparison and of the lidars,
-`surface` of section cuts and residuals,
+`surface` of section cuts and residuals, `yard` of what the registration left,
 `fatigue` over cycles; `style` is how all of them look.
 """
 
@@ -18,6 +18,7 @@ from lidar_deflect.plots import (
     spans,
     style,
     surface,
+    yard,
 )
 from lidar_deflect.plots.series import Quantity
 from lidar_deflect.plots.source import HasTables
@@ -98,6 +99,14 @@ class Plots:
     def pose_uncertainty(self) -> go.Figure:
         """Draw the expanded uncertainty of every lidar's pose."""
         return places.pose_uncertainty(self._result)
+
+    def yard_residuals(self) -> go.Figure:
+        """Draw the mean residual of the registration's rays over ground and walls."""
+        return yard.yard_residuals(self._result)
+
+    def lidar_shares(self) -> go.Figure:
+        """Draw how many rays of every lidar hold ground and walls."""
+        return yard.lidar_shares(self._result)
 
     def drift(self) -> go.Figure:
         """Draw how far every lidar turned and moved during the test."""

@@ -12,6 +12,10 @@ from lidar_deflect.plots import style
 from lidar_deflect.plots.source import HasTables, configuration, poses_of, sections, some, table
 
 _MOST_SECTIONS = 12
+_INSIDE_95 = 5.991**0.5
+"""Semi-axes of the 95 % ellipse over standard deviations: chi-square of two degrees of freedom."""
+_ELLIPSE_PART = 0.4
+"""The largest ellipse is about as large as this part of the way between the outer lidars."""
 
 
 def plan(result: HasTables) -> go.Figure:
@@ -39,6 +43,7 @@ def plan(result: HasTables) -> go.Figure:
         figure, words.PLOT["wire_anchor"], "x", _places(config.get("wires"), "name", "anchor_m")
     )
     _add_control(figure, config)
+    _add_ellipses(figure, result)
     if not figure.data:
         return style.note(figure, words.PLOT["nothing_has_a_place"])
     figure.update_xaxes(title_text=words.PLOT["z_along_the_blade"], constrain="domain")
@@ -106,6 +111,50 @@ def _add_control(figure: go.Figure, config: Mapping[str, Any]) -> None:
                 hovertemplate="z %{x:.2f} m<br>x %{y:.2f} m<extra>%{fullData.name}</extra>",
             )
         )
+
+
+def _add_ellipses(figure: go.Figure, result: HasTables) -> None:
+    """Draw where each lidar stands with 95 % probability, enlarged so that it can be seen."""
+    known = [entry for entry in poses_of(result) if entry.get("covariance")]
+    if not known:
+        return
+    places = np.array([_matrix(entry["world_from_sensor"])[[2, 0], 3] for entry in known])
+    rings = [_ellipse(entry["covariance"]) for entry in known]
+    largest_m = max(float(np.abs(ring).max()) for ring in rings)
+    times = _round(_ELLIPSE_PART * max(float(np.ptp(places, axis=0).max()), 10.0) / largest_m)
+    for k, (place, ring) in enumerate(zip(places, rings, strict=True)):
+        z, x = (place[:, None] + times * ring).tolist()
+        figure.add_trace(
+            go.Scatter(
+                x=z,
+                y=x,
+                mode="lines",
+                name=words.PLOT["ellipse_enlarged"].format(times=times),
+                legendgroup="ellipse",
+                showlegend=k == 0,
+                line={"color": style.colour(1), "width": 1.2},
+                hoverinfo="skip",
+            )
+        )
+
+
+def _matrix(pose: Any) -> Any:
+    return np.asarray(pose, dtype=np.float64)
+
+
+def _ellipse(covariance: Any) -> Any:
+    """Return the 95 % ellipse in z and x about its middle, shape (2, 73), metres."""
+    square = np.asarray(covariance, dtype=np.float64).reshape(6, 6)[np.ix_([5, 3], [5, 3])]
+    values, axes = np.linalg.eigh(square)
+    turn = np.linspace(0.0, 2.0 * np.pi, 73)
+    circle = np.array([np.cos(turn), np.sin(turn)])
+    return axes @ (_INSIDE_95 * np.sqrt(np.maximum(values, 0.0))[:, None] * circle)
+
+
+def _round(times: float) -> int:
+    """Round down to 1, 2 or 5 times a power of ten, at least 1."""
+    power = 10.0 ** np.floor(np.log10(max(times, 1.0)))
+    return int(power * max(step for step in (1, 2, 5) if step * power <= max(times, 1.0)))
 
 
 _TURNS = (words.PLOT["turn_about_x"], words.PLOT["turn_about_y"], words.PLOT["turn_about_z"])

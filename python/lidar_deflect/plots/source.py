@@ -47,6 +47,15 @@ def poses_of(result: HasTables) -> list[Mapping[str, Any]]:
     return [entry for entry in document.get("lidars", ()) if "world_from_sensor" in entry]
 
 
+def evidence_of(result: HasTables) -> Mapping[str, Any]:
+    """Return the evidence of a result's calibration as a whole; empty where it has none."""
+    found = getattr(result, "calibration", None)
+    if found is None:
+        return {}
+    document = found if isinstance(found, Mapping) else found.to_dict()
+    return document.get("evidence") or {}
+
+
 def some(things: Sequence[Any], most: int) -> list[Any]:
     """Pick at most `most` things evenly, the last one always among them."""
     if len(things) <= most:

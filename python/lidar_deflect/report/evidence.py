@@ -47,6 +47,11 @@ def calibration(folder: Folder) -> tuple[Block, ...]:
         found.append(Figure("pose_uncertainty", caption, plots.pose_uncertainty()))
     else:
         found.append(Text((words.NO_COVARIANCE,)))
+    if (document.get("evidence") or {}).get("cells"):
+        found += [
+            Figure("yard_residuals", words.CAPTIONS["yard_residuals"], plots.yard_residuals()),
+            Figure("lidar_shares", words.CAPTIONS["lidar_shares"], plots.lidar_shares()),
+        ]
     found += _rest(document, lidars)
     if folder.poses.height:
         found.append(Figure("drift", words.CAPTIONS["drift"], plots.drift(), link="time"))
@@ -64,7 +69,8 @@ def _rest(document: Mapping[str, Any], lidars: list[Mapping[str, Any]]) -> list[
         found.append(table)
     more = document.get("evidence")
     if isinstance(more, Mapping) and more:
-        pairs = tuple((label(str(key)), flat(value)) for key, value in more.items())
+        said_whole = ((key, value) for key, value in more.items() if key != "cells")
+        pairs = tuple((label(str(key)), flat(value)) for key, value in said_whole)
         found.append(Facts(pairs))
     warnings = tuple(str(each) for each in document.get("warnings") or ())
     return found + ([Bullets(warnings, "warn")] if warnings else [])

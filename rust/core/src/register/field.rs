@@ -77,15 +77,24 @@ fn bessel_k1(x: f64) -> f64 {
 pub type Sparse = Vec<(usize, f64)>;
 
 /// The nodes of a surface that something was measured near.
+///
+/// A surface has one layer of nodes for all who know where on it they measure, and one more for each who
+/// does not: what turns freely sees the same heights elsewhere, and may not be held against the others.
 #[derive(Debug, Clone)]
 pub struct Field {
     roughness: Roughness,
+    layers: Vec<Grid>,
+    /// Height of each node, metres.
+    pub heights_m: Vec<f64>,
+}
+
+/// One layer of nodes.
+#[derive(Debug, Clone)]
+struct Grid {
     spacing_m: f64,
     corner_m: [f64; 2],
     shape: [usize; 2],
     number: Vec<Option<usize>>,
-    /// Height of each node, metres.
-    pub heights_m: Vec<f64>,
 }
 
 /// The nodes around a place and their weights.
@@ -107,27 +116,79 @@ const MOST_NODES: f64 = 16_000.0;
 const BETWEEN_NODES: f64 = 0.9;
 
 impl Field {
-    /// A field at rest that covers the places (u, v), metres.
-    pub fn new(roughness: Roughness, places_m: &[[f64; 2]]) -> Self {
+    /// A field at rest whose layers cover the places (u, v), metres.
+    pub fn new(roughness: Roughness, layers_m: &[Vec<[f64; 2]>]) -> Self {
+        let mut count = 0;
+        let grid = |places_m: &Vec<[f64; 2]>| Grid::new(&roughness, places_m, &mut count);
+        let layers = layers_m.iter().map(grid).collect();
+        Self {
+            roughness,
+            layers,
+            heights_m: vec![0.0; count],
+        }
+    }
+
+    /// Distance between neighbouring nodes where it is largest, metres.
+    pub fn spacing_m(&self) -> f64 {
+        let layers = self.layers.iter();
+        layers.map(|grid| grid.spacing_m).fold(0.0, f64::max)
+    }
+
+    /// Standard deviation of what a blend between nodes does not follow, metres.
+    pub fn between_m(&self) -> f64 {
+        let apart = self.spacing_m() / self.roughness.correlation_m;
+        (BETWEEN_NODES * apart).min(1.0) * self.roughness.sigma_m
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.heights_m.len()
+    }
+
+    /// Whether nothing was measured.
+    pub fn is_empty(&self) -> bool {
+        self.heights_m.is_empty()
+    }
+
+    /// How rough the surface is taken to be.
+    pub fn roughness(&self) -> &Roughness {
+        &self.roughness
+    }
+
+    /// The nodes of a layer around a place, None where one of them is not there.
+    pub fn around(&self, layer: usize, place_m: &[f64; 2]) -> Option<Around> {
+        self.layers.get(layer)?.around(place_m)
+    }
+
+    /// Rows W of the prior: the precision of the heights is W^T W.
+    pub fn prior(&self) -> Vec<Sparse> {
+        let layers = self.layers.iter();
+        layers
+            .flat_map(|grid| grid.prior(&self.roughness))
+            .collect()
+    }
+}
+
+impl Grid {
+    /// Nodes near the places, numbered from `count` on.
+    fn new(roughness: &Roughness, places_m: &[[f64; 2]], count: &mut usize) -> Self {
         let [low, high] = bounds(places_m);
         let area = (high[0] - low[0] + 1.0) * (high[1] - low[1] + 1.0);
         let spacing_m =
             (roughness.correlation_m / NODES_PER_LENGTH).max((area / MOST_NODES).sqrt());
         let corner_m = [0, 1].map(|k| low[k] - HALO as f64 * spacing_m);
         let shape = [0, 1].map(|k| ((high[k] - low[k]) / spacing_m) as usize + 2 + 2 * HALO);
-        let mut field = Self {
-            roughness,
+        let mut grid = Self {
             spacing_m,
             corner_m,
             shape,
             number: vec![None; shape[0] * shape[1]],
-            heights_m: Vec::new(),
         };
-        field.activate(places_m);
-        field
+        grid.activate(places_m, count);
+        grid
     }
 
-    fn activate(&mut self, places_m: &[[f64; 2]]) {
+    fn activate(&mut self, places_m: &[[f64; 2]], count: &mut usize) {
         let mut active = vec![false; self.number.len()];
         for place in places_m {
             let [i, j] = self.cell(place).map(|c| c.0);
@@ -137,14 +198,10 @@ impl Field {
                 }
             }
         }
-        let mut count = 0;
-        for (number, active) in self.number.iter_mut().zip(active) {
-            if active {
-                *number = Some(count);
-                count += 1;
-            }
+        for (number, _) in self.number.iter_mut().zip(active).filter(|n| n.1) {
+            *number = Some(*count);
+            *count += 1;
         }
-        self.heights_m = vec![0.0; count];
     }
 
     /// Nodes run along the shorter side first, which keeps neighbours close in number.
@@ -164,34 +221,7 @@ impl Field {
         })
     }
 
-    /// Distance between neighbouring nodes, metres.
-    pub fn spacing_m(&self) -> f64 {
-        self.spacing_m
-    }
-
-    /// Standard deviation of what a blend between nodes does not follow, metres.
-    pub fn between_m(&self) -> f64 {
-        let apart = self.spacing_m / self.roughness.correlation_m;
-        (BETWEEN_NODES * apart).min(1.0) * self.roughness.sigma_m
-    }
-
-    /// Number of nodes.
-    pub fn len(&self) -> usize {
-        self.heights_m.len()
-    }
-
-    /// Whether nothing was measured.
-    pub fn is_empty(&self) -> bool {
-        self.heights_m.is_empty()
-    }
-
-    /// How rough the surface is taken to be.
-    pub fn roughness(&self) -> &Roughness {
-        &self.roughness
-    }
-
-    /// The nodes around a place, None where one of them is not there.
-    pub fn around(&self, place_m: &[f64; 2]) -> Option<Around> {
+    fn around(&self, place_m: &[f64; 2]) -> Option<Around> {
         let [(i, a), (j, b)] = self.cell(place_m);
         if !(0.0..=1.0).contains(&a) || !(0.0..=1.0).contains(&b) {
             return None;
@@ -209,11 +239,10 @@ impl Field {
         })
     }
 
-    /// Rows W of the prior: the precision of the heights is W^T W.
-    pub fn prior(&self) -> Vec<Sparse> {
-        let (h2, kappa2) = (self.spacing_m.powi(2), self.roughness.kappa().powi(2));
-        let scale = (h2 / (4.0 * PI * kappa2)).sqrt() / self.roughness.sigma_m;
-        let mut rows = Vec::with_capacity(self.len());
+    fn prior(&self, roughness: &Roughness) -> Vec<Sparse> {
+        let (h2, kappa2) = (self.spacing_m.powi(2), roughness.kappa().powi(2));
+        let scale = (h2 / (4.0 * PI * kappa2)).sqrt() / roughness.sigma_m;
+        let mut rows = Vec::new();
         for i in 0..self.shape[0] {
             for j in 0..self.shape[1] {
                 let Some(node) = self.number[self.place(i, j)] else {
@@ -285,7 +314,7 @@ mod tests {
         let places: Vec<_> = (0..14)
             .flat_map(|i| (0..14).map(move |j| [0.5 * f64::from(i), 0.5 * f64::from(j)]))
             .collect();
-        let field = Field::new(rough(), &places);
+        let field = Field::new(rough(), &[places]);
         let mut precision: DMatrix<f64> = DMatrix::zeros(field.len(), field.len());
         for row in field.prior() {
             for (i, a) in &row {
@@ -295,7 +324,7 @@ mod tests {
             }
         }
         let covariance = precision.cholesky().unwrap().inverse();
-        let node = |p: [f64; 2]| field.around(&p).unwrap().nodes[0];
+        let node = |p: [f64; 2]| field.around(0, &p).unwrap().nodes[0];
         let (a, b) = (node([3.0, 3.0]), node([3.5, 3.0]));
         let sigma_m = covariance[(a, a)].sqrt();
         // Three nodes per correlation length: the grid itself costs some percent.
@@ -309,9 +338,9 @@ mod tests {
 
     #[test]
     fn heights_between_nodes_are_blended() {
-        let mut field = Field::new(rough(), &[[0.0, 0.0], [4.0, 1.0]]);
-        assert!(field.around(&[2.0, 0.5]).is_none()); // nothing was measured there
-        let around = field.around(&[0.1, 0.2]).unwrap();
+        let mut field = Field::new(rough(), &[vec![[0.0, 0.0], [4.0, 1.0]]]);
+        assert!(field.around(0, &[2.0, 0.5]).is_none()); // nothing was measured there
+        let around = field.around(0, &[0.1, 0.2]).unwrap();
         for (k, node) in around.nodes.into_iter().enumerate() {
             field.heights_m[node] = [1.0, 2.0, 4.0, 5.0][k]; // 1 + 1 a + 3 b
         }
@@ -319,5 +348,20 @@ mod tests {
             .map(|k| around.weights[k] * field.heights_m[around.nodes[k]])
             .sum();
         assert!((blended - (1.0 + 0.1 / 0.5 + 3.0 * 0.2 / 0.5)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn layers_have_nodes_of_their_own() {
+        let one = vec![[0.0, 0.0]];
+        let first = Field::new(rough(), std::slice::from_ref(&one)).len();
+        let field = Field::new(rough(), &[one, vec![[0.0, 0.0], [9.0, 0.0]]]);
+        let nodes = |layer| field.around(layer, &[0.1, 0.1]).unwrap().nodes;
+        assert!(nodes(0).iter().all(|node| *node < first));
+        assert!(nodes(1).iter().all(|node| *node >= first));
+        assert!(field.around(0, &[9.0, 0.0]).is_none() && field.around(2, &[0.0, 0.0]).is_none());
+        // No row of the prior ties one layer to the other.
+        let in_first = |row: &Sparse| row.iter().filter(|e| e.0 < first).count();
+        let mut rows = field.prior().into_iter();
+        assert!(rows.all(|row| [0, row.len()].contains(&in_first(&row))));
     }
 }

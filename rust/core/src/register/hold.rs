@@ -17,6 +17,12 @@ const QUANTUM_M: f64 = 0.003;
 const STATIC_SHARE: f64 = 0.7;
 /// Echoes by which a cell's own scatter is drawn towards that of all cells.
 const SHRINKAGE: f64 = 8.0;
+/// Cells whose variance is so many times the median's hold an edge or a mover.
+const EDGE: f64 = 6.0;
+/// Echoes scatter by no less than this, metres.
+const LEAST_SCATTER_M: f64 = 1e-4;
+/// So many cells tell by how much echoes scatter.
+const SAMPLE: usize = 4000;
 /// The scatter is read where this share of the deviations from the median ends, so that a cell which
 /// is half one thing and half another does not take the way between them for noise; and what it is
 /// in standard deviations there.
@@ -173,24 +179,22 @@ pub fn add_up(echoes: &Echoes<'_>, params: &HoldParams) -> Hold {
     let cells = (360.0 / params.step_deg).ceil() as u32;
     let mut sorted = keyed(echoes, params.step_deg, cells);
     sorted.sort_by(|a, b| a.key.cmp(&b.key).then(a.range_m.total_cmp(&b.range_m)));
-    let mut hold = Hold {
+    let all = sorted.chunk_by(|a, b| a.key == b.key);
+    let (full, sparse): (Vec<_>, Vec<_>) = all.partition(|cell| cell.len() >= params.min_count);
+    let clear = |usual_m: f64| move |cell: &&[Echo]| mean_ray(cell, echoes, usual_m);
+    let thin = full.len().div_ceil(SAMPLE).max(1);
+    let sample: Vec<_> = full.iter().step_by(thin).copied().collect();
+    let usual_m = usual_scatter(&sample.iter().filter_map(clear(0.0)).collect::<Vec<_>>());
+    let means: Vec<_> = full.iter().filter_map(clear(usual_m)).collect();
+    let single_m = usual_scatter(&means);
+    let beams: Vec<Beam> = means.iter().map(|m| settled(m, single_m)).collect();
+    Hold {
+        bright: bright(echoes, &beams, single_m, params.step_deg),
         cells,
-        ..Hold::default()
-    };
-    let mut degrees = Vec::new();
-    for cell in sorted.chunk_by(|a, b| a.key == b.key) {
-        if cell.len() < params.min_count {
-            hold.sparse += 1;
-        } else if let Some((beam, freedom)) = mean_ray(cell, echoes) {
-            hold.beams.push(beam);
-            degrees.push(freedom);
-        } else {
-            hold.unclear += 1;
-        }
+        unclear: full.len() - beams.len(),
+        sparse: sparse.len(),
+        beams,
     }
-    let single_m = settle_scatter(&mut hold.beams, &degrees);
-    hold.bright = bright(echoes, &hold.beams, single_m, params.step_deg);
-    hold
 }
 
 /// The brightest echoes one by one; none where intensities are not known.
@@ -247,13 +251,17 @@ fn vector(point: &[f32; 3]) -> Vector3<f64> {
     Vector3::new(point[0].into(), point[1].into(), point[2].into())
 }
 
-/// Mean of the echoes that agree with the median, and how many its scatter rests on.
-fn mean_ray(cell: &[Echo], echoes: &Echoes<'_>) -> Option<(Beam, f64)> {
+/// A mean ray whose sigma is the scatter of its single echoes, and how many they are.
+type Mean = (Beam, f64);
+
+/// Mean of the echoes that agree with the median; echoes scatter by no less than `usual_m`, whatever
+/// a handful of them makes believe.
+fn mean_ray(cell: &[Echo], echoes: &Echoes<'_>, usual_m: f64) -> Option<Mean> {
     let median = cell[cell.len() / 2].range_m;
     let mut deviations: Vec<f64> = cell.iter().map(|e| (e.range_m - median).abs()).collect();
     deviations.sort_by(f64::total_cmp);
-    let inner = deviations[(QUANTILE * cell.len() as f64) as usize];
-    let limit = MOVER * QUANTILE_TO_SIGMA * inner + QUANTUM_M;
+    let inner = QUANTILE_TO_SIGMA * deviations[(QUANTILE * cell.len() as f64) as usize];
+    let limit = MOVER * inner.max(usual_m) + QUANTUM_M;
     let kept: Vec<&Echo> = cell
         .iter()
         .filter(|e| (e.range_m - median).abs() <= limit)
@@ -280,7 +288,7 @@ fn mean_ray(cell: &[Echo], echoes: &Echoes<'_>) -> Option<(Beam, f64)> {
     let beam = Beam {
         direction: Unit::new_normalize(direction),
         range_m,
-        sigma_m: (scatter * count / (count - 2.0).max(1.0)).sqrt(), // of one echo; see below
+        sigma_m: (scatter * count / (count - 2.0).max(1.0)).sqrt(),
         intensity,
         ring: cell[0].key.0,
         cell: cell[0].key.1,
@@ -288,19 +296,33 @@ fn mean_ray(cell: &[Echo], echoes: &Echoes<'_>) -> Option<(Beam, f64)> {
     Some((beam, count))
 }
 
-/// Turns the scatter of single echoes into that of means. A handful of echoes says little of its own
-/// scatter, so it is drawn towards the median of all cells, which is returned.
-fn settle_scatter(beams: &mut [Beam], counts: &[f64]) -> f64 {
-    let mut all: Vec<f64> = beams.iter().map(|b| b.sigma_m).collect();
+/// Standard deviation of a single echo over many cells, metres: the median variance, freed from what the
+/// median of a few degrees of freedom lies too low, tells which cells hold an edge; the others' mean is it.
+fn usual_scatter(means: &[Mean]) -> f64 {
+    let own = |(beam, count): &Mean| (beam.sigma_m.powi(2), count - 2.0);
+    let free: Vec<(f64, f64)> = means.iter().map(own).filter(|m| m.1 > 0.0).collect();
+    // Wilson and Hilferty: the median of chi-square over its degrees of freedom.
+    let even = |(variance, freedom): &(f64, f64)| variance / (1.0 - 2.0 / (9.0 * freedom)).powi(3);
+    let mut all: Vec<f64> = free.iter().map(even).collect();
     all.sort_by(f64::total_cmp);
-    let common = all.get(all.len() / 2).copied().unwrap_or(0.0).max(1e-4);
-    for (beam, count) in beams.iter_mut().zip(counts) {
-        let own = (count - 2.0).max(0.0);
-        let variance =
-            (own * beam.sigma_m.powi(2) + SHRINKAGE * common * common) / (own + SHRINKAGE);
-        beam.sigma_m = (variance / count).sqrt();
+    let median = all.get(all.len() / 2).copied().unwrap_or(0.0);
+    let clear = free.iter().filter(|m| m.0 <= EDGE * median);
+    let (sum, freedom) = clear.fold((0.0, 0.0), |s, (v, f)| (s.0 + f * v, s.1 + f));
+    match freedom > 0.0 {
+        true => (sum / freedom).sqrt().max(LEAST_SCATTER_M),
+        false => LEAST_SCATTER_M,
     }
-    common
+}
+
+/// Turns the scatter of single echoes into that of their mean. A handful of echoes says little of its own
+/// scatter, so it is drawn towards the usual one.
+fn settled((beam, count): &Mean, usual_m: f64) -> Beam {
+    let own = (count - 2.0).max(0.0);
+    let variance = (own * beam.sigma_m.powi(2) + SHRINKAGE * usual_m * usual_m) / (own + SHRINKAGE);
+    Beam {
+        sigma_m: (variance / count).sqrt(),
+        ..*beam
+    }
 }
 
 #[cfg(test)]
@@ -324,6 +346,22 @@ mod tests {
             }
         }
         rows
+    }
+
+    #[test]
+    fn a_few_sweeps_tell_the_scatter_as_well_as_many_do() {
+        // Three to six echoes a cell: the median of so few variances is half of the variance.
+        let (points, azimuths) = wall(0.012);
+        for sweeps in [3, 4, 6, 40] {
+            let few = 50 * sweeps;
+            let hold = hold_of(&(points[..few].to_vec(), azimuths[..few].to_vec()));
+            let mean = |b: &Beam| b.sigma_m * (sweeps as f64).sqrt();
+            let single_m = hold.beams.iter().map(mean).sum::<f64>() / hold.beams.len() as f64;
+            assert!(
+                (single_m / 0.012 - 1.0).abs() < 0.25,
+                "{sweeps}: {single_m}"
+            );
+        }
     }
 
     fn hold_of(rows: &(Vec<[f32; 3]>, Vec<f32>)) -> Hold {

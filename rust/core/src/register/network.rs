@@ -17,7 +17,7 @@ use super::normal::{Normal, Solved};
 use super::rows::{self, Place, Row};
 use super::select::{self, Gate, Met};
 use super::state::{Layout, State, Term};
-use super::surface::Surface;
+use super::surface::{SHARED, Surface};
 use super::survey::Known;
 use super::target::{self, OnSphere};
 use super::variogram::{self, Sample};
@@ -67,6 +67,8 @@ const LEARNING_ROUNDS: usize = 2;
 const LEAST_OFFSET_U_M: f64 = 2e-3;
 /// Prior sigma of a unit's error of range to retroreflectors, metres.
 const RETRO_U_M: f64 = 0.02;
+/// Prior sigma of a model's error of range to what is met at 60 degrees from its normal, metres.
+const SLANT_U_M: f64 = 1.5e-3;
 /// A turn less sure than this is held by no observation, radians.
 const LOOSE_TURN_RAD: f64 = 0.01;
 /// Holds nothing but an unknown that nothing else holds: radians, and metres.
@@ -209,14 +211,15 @@ pub fn adjust(network: &Network, stop: &AtomicBool) -> Result<Adjusted, NetworkE
         work.select(gate)?;
         work.settle(Doubt::All, COARSE)?;
     }
-    work.roughen();
+    let mut solved = work.settle(Doubt::All, COARSE)?;
+    work.roughen(&solved);
     for _ in 0..LEARNING_ROUNDS {
-        let solved = work.settle(Doubt::All, COARSE)?;
+        solved = work.settle(Doubt::All, COARSE)?;
         work.learn_offsets(&solved);
-        work.roughen();
+        work.roughen(&solved);
     }
     work.select(&GATES[GATES.len() - 1])?;
-    let mut solved = work.settle(Doubt::Rays, SETTLED)?;
+    solved = work.settle(Doubt::Rays, SETTLED)?;
     while let Some(worst) = work.worst(&solved) {
         work.left_out[worst] = true;
         solved = work.settle(Doubt::Rays, SETTLED)?;
@@ -238,6 +241,8 @@ struct Work<'a> {
     layout: Layout,
     met: Vec<Met>,
     places: Vec<Place>,
+    /// Of the roughness, by lidar.
+    layers: Vec<usize>,
     spheres: Vec<OnSphere>,
     spheres_alike: Vec<f64>,
     slack_m: f64,
@@ -256,6 +261,7 @@ impl<'a> Work<'a> {
             layout: network.start.layout(),
             met: Vec::new(),
             places: Vec::new(),
+            layers: vec![SHARED; network.start.lidars.len()],
             spheres: Vec::new(),
             spheres_alike: Vec::new(),
             slack_m: 0.0,
@@ -314,18 +320,20 @@ impl<'a> Work<'a> {
             let side_m = surface.field.as_ref().map_or(ALIKE_M, Field::spacing_m);
             let [u, v, _] = surface.frame.local(&point);
             let cell = |t: f64| (t / side_m).floor() as i64;
-            let around = surface.around(&point);
-            ((met.lidar, met.surface, cell(u), cell(v)), around)
+            let around = surface.around(self.layers[met.lidar], &point);
+            let slant = surface.slant(&self.state.lidars[met.lidar].position_m, &point);
+            ((met.lidar, met.surface, cell(u), cell(v)), around, slant)
         };
         let places: Vec<_> = self.met.iter().map(place).collect();
         let mut counts = HashMap::new();
-        for (cell, _) in &places {
+        for (cell, ..) in &places {
             *counts.entry(*cell).or_insert(0.0) += 1.0;
         }
-        let places = places.into_iter().map(|(cell, around)| Place {
+        let places = places.into_iter().map(|(cell, around, slant)| Place {
             surface: cell.1,
             around,
             alike: counts[&cell],
+            slant,
         });
         places.collect()
     }
@@ -396,10 +404,7 @@ impl<'a> Work<'a> {
     fn frozen(&self) -> Vec<(usize, f64)> {
         let turns =
             |at: &usize| (*at + Term::ROTATION..*at + Term::POSITION).map(|k| (k, LOOSE_TURN_RAD));
-        match self.layout.nodes {
-            0 => Vec::new(),
-            _ => self.layout.lidars.iter().flat_map(turns).collect(),
-        }
+        self.layout.lidars.iter().flat_map(turns).collect()
     }
 
     fn ray(&self, met: &Met, place: &Place) -> Option<Row> {
@@ -428,6 +433,11 @@ impl<'a> Work<'a> {
         targets.for_each(|k| normal.hold(k, 0.0, LOOSE_M));
         for (lidar, at) in self.state.lidars.iter().zip(&self.layout.retro) {
             normal.hold(*at, lidar.retro_m, RETRO_U_M);
+        }
+        let slants = self.state.lidars.iter().map(|lidar| lidar.slant_m);
+        let slants: BTreeMap<_, _> = self.layout.slants.iter().zip(slants).collect();
+        for (at, slant_m) in slants {
+            normal.hold(*at, slant_m, SLANT_U_M);
         }
     }
 
@@ -459,29 +469,52 @@ impl<'a> Work<'a> {
     }
 
     /// Gives every surface the roughness that its residuals show.
-    fn roughen(&mut self) {
+    fn roughen(&mut self, solved: &Solved) {
+        self.layers = self.layers(solved);
         for surface in 0..self.state.surfaces.len() {
             let samples = self.samples(surface);
             let Some(roughness) = variogram::roughness(&samples) else {
                 continue;
             };
-            let mut places: Vec<_> = samples.iter().map(|s| s.place_m).collect();
-            places.extend(self.network.known.iter().filter_map(|known| match known {
-                Known::Control {
-                    surface: on, xyz_m, ..
-                } if *on == surface => {
-                    let [u, v, _] = self.state.surfaces[surface].frame.local(xyz_m);
-                    Some([u, v])
-                }
-                _ => None,
-            }));
-            if roughness.sigma_m < SMOOTH_M {
-                places.clear();
-            }
-            self.state.surfaces[surface].field = Some(Field::new(roughness, &places));
+            let layers = match roughness.sigma_m < SMOOTH_M {
+                true => Vec::new(),
+                false => self.places_by_layer(surface, &samples),
+            };
+            self.state.surfaces[surface].field = Some(Field::new(roughness, &layers));
         }
         self.layout = self.state.layout();
         self.places = self.places();
+    }
+
+    /// Layer of the roughness of every lidar: one of its own where nothing but a mounting holds a turn.
+    fn layers(&self, solved: &Solved) -> Vec<usize> {
+        let is_loose = |at: &usize| {
+            let mut turns = *at + Term::ROTATION..*at + Term::POSITION;
+            turns.any(|k| solved.covariance[(k, k)] > LOOSE_TURN_RAD * LOOSE_TURN_RAD)
+        };
+        let lidars = self.layout.lidars.iter().enumerate();
+        lidars
+            .map(|(lidar, at)| if is_loose(at) { lidar + 1 } else { SHARED })
+            .collect()
+    }
+
+    /// Where on a surface something was measured, (u, v) by layer.
+    fn places_by_layer(&self, surface: usize, samples: &[Sample]) -> Vec<Vec<[f64; 2]>> {
+        let mut layers = vec![Vec::new(); self.layers.iter().max().map_or(1, |most| most + 1)];
+        for sample in samples {
+            layers[self.layers[sample.group]].push(sample.place_m);
+        }
+        for known in &self.network.known {
+            if let Known::Control {
+                surface: on, xyz_m, ..
+            } = known
+                && *on == surface
+            {
+                let [u, v, _] = self.state.surfaces[surface].frame.local(xyz_m);
+                layers[SHARED].push([u, v]);
+            }
+        }
+        layers
     }
 
     /// Residual heights of the rays on a surface.
@@ -497,9 +530,10 @@ impl<'a> Work<'a> {
             let beam = &self.network.holds[met.lidar].beams[met.beam];
             let lidar = &self.state.lidars[met.lidar];
             let point = select::world(lidar, beam);
+            let ray = (point - lidar.position_m) / beam.range_m;
+            let point = point + ray * (lidar.slant_m * place.slant);
             let [u, v, _] = shape.frame.local(&point);
             let (height_m, gradient, _) = shape.above(&point);
-            let ray = (point - lidar.position_m) / beam.range_m;
             let cosine = gradient.dot(&ray).abs() / gradient.norm();
             Some(Sample {
                 place_m: [u, v],

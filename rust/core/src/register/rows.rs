@@ -110,6 +110,8 @@ pub struct Place {
     pub around: Option<Around>,
     /// So many rays of the same lidar share what the surface hides there.
     pub alike: f64,
+    /// How slantwise the ray meets it: 1 / cos(incidence) - 1.
+    pub slant: f64,
 }
 
 /// A mean ray that met a surface; None where the model's ray meets it nowhere.
@@ -127,6 +129,7 @@ pub fn ray(
         direction,
         by_elevation,
     } = aimed(of, beam);
+    let range_m = range_m + of.slant_m * place.slant;
     let (meets_m, gradient, height) =
         shape.meet(&of.position_m, &direction, range_m, place.around)?;
     let closing = gradient.dot(&direction);
@@ -152,6 +155,7 @@ pub fn ray(
         &arm,
         &lifted,
     );
+    row.border.push((layout.slants[lidar], place.slant));
     row.shape(layout, surface, &height, -1.0 / closing);
     Some(row)
 }

@@ -1,5 +1,7 @@
 //! The unknowns of the adjustment: poses, what is wrong with each lidar, surfaces, targets.
 
+use std::collections::BTreeMap;
+
 use nalgebra::{Rotation3, Vector3};
 
 use super::surface::{COEFFICIENTS, Height, Surface};
@@ -23,6 +25,8 @@ pub struct LidarState {
     pub offsets_m: Vec<f64>,
     /// The same of echoes of retroreflectors on top, metres.
     pub retro_m: f64,
+    /// The same of what is met slantwise on top, times 1 / cos(incidence) - 1, metres.
+    pub slant_m: f64,
 }
 
 /// Everything that is estimated.
@@ -63,6 +67,9 @@ pub struct Layout {
     pub targets: Vec<usize>,
     /// Error of range to retroreflectors, by lidar; empty without targets.
     pub retro: Vec<usize>,
+    /// Error of range to what is met slantwise, by lidar: one unknown of all with as many channels, as
+    /// optics and electronics of a model make it.
+    pub slants: Vec<usize>,
     /// Number of unknowns of the border.
     pub border: usize,
     /// First node by surface.
@@ -89,6 +96,11 @@ impl State {
         layout.targets = self.targets.iter().map(|_| next(3)).collect();
         let bright = self.lidars.iter().filter(|_| !self.targets.is_empty());
         layout.retro = bright.map(|_| next(1)).collect();
+        let mut of_kind = BTreeMap::new();
+        let kinds = self.lidars.iter().map(|lidar| lidar.offsets_m.len());
+        layout.slants = kinds
+            .map(|channels| *of_kind.entry(channels).or_insert_with(|| next(1)))
+            .collect();
         for surface in &self.surfaces {
             layout.fields.push(layout.nodes);
             layout.nodes += surface.field.as_ref().map_or(0, super::field::Field::len);
@@ -144,6 +156,9 @@ impl State {
         }
         for (lidar, at) in self.lidars.iter_mut().zip(&layout.retro) {
             lidar.retro_m += border[*at];
+        }
+        for (lidar, at) in self.lidars.iter_mut().zip(&layout.slants) {
+            lidar.slant_m += border[*at];
         }
     }
 }

@@ -7,6 +7,9 @@ use super::field::{Around, Field};
 /// Number of coefficients of the smooth part: 1, u, v, u^2, uv, v^2.
 pub const COEFFICIENTS: usize = 6;
 
+/// The layer of roughness of the survey and of all lidars that do not turn freely.
+pub const SHARED: usize = 0;
+
 /// Where a surface lies, to within what the adjustment finds: u and v along it, h along its normal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceFrame {
@@ -84,10 +87,10 @@ impl Surface {
         }
     }
 
-    /// Nodes of the roughness around a point of the world, None where there are none.
-    pub fn around(&self, point_m: &Vector3<f64>) -> Option<Around> {
+    /// Nodes of one layer of the roughness around a point of the world, None where there are none.
+    pub fn around(&self, layer: usize, point_m: &Vector3<f64>) -> Option<Around> {
         let [u, v, _] = self.frame.local(point_m);
-        self.field.as_ref()?.around(&[u, v])
+        self.field.as_ref()?.around(layer, &[u, v])
     }
 
     /// Its height above the place (u, v), of whose roughness the nodes `around` tell.
@@ -123,7 +126,14 @@ impl Surface {
     /// The gradient is that of the smooth part: the slopes of the roughness are as uncertain as they
     /// are steep, and a derivative that follows them takes noise for leverage.
     pub fn above(&self, point_m: &Vector3<f64>) -> (f64, Vector3<f64>, Height) {
-        self.above_nodes(point_m, self.around(point_m))
+        self.above_nodes(point_m, self.around(SHARED, point_m))
+    }
+
+    /// How slantwise a ray from `origin_m` meets it at a place: 1 / cos(incidence) - 1.
+    pub fn slant(&self, origin_m: &Vector3<f64>, point_m: &Vector3<f64>) -> f64 {
+        let (ray, gradient) = (point_m - origin_m, self.above(point_m).1);
+        let cosine = gradient.dot(&ray).abs() / (gradient.norm() * ray.norm());
+        1.0 / cosine.max(LEAST_COSINE) - 1.0
     }
 
     fn above_nodes(

@@ -152,6 +152,7 @@ mod tests {
             scale: 2e-4,
             offsets_m: vec![0.01, -0.02],
             retro_m: 0.004,
+            slant_m: 0.002,
         };
         let normal = Unit::new_normalize(Vector3::new(-0.02, 1.0, 0.0123));
         let frame = SurfaceFrame::new(Vector3::new(0.0, -8.0, 95.0), normal, [20.0, 15.0]);
@@ -163,7 +164,7 @@ mod tests {
         let places: Vec<_> = (-25..25)
             .flat_map(|i| (-25..25).map(move |j| [f64::from(i), f64::from(j)]))
             .collect();
-        let field = Field::new(rough, &places);
+        let field = Field::new(rough, &[places]);
         let surface = Surface {
             coefficients: [0.01, 0.02, -0.01, 0.03, 0.01, -0.02],
             field: Some(field),
@@ -199,8 +200,9 @@ mod tests {
         let end = super::super::select::world(&state.lidars[0], &beam());
         Place {
             surface: 0,
-            around: state.surfaces[0].around(&end),
+            around: state.surfaces[0].around(0, &end),
             alike: 1.0,
+            slant: 0.7,
         }
     }
 

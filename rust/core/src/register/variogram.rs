@@ -1,12 +1,17 @@
 //! How rough a surface is, from how residual heights differ over distance.
 
+use std::collections::BTreeMap;
+
 use super::field::Roughness;
 
 /// Upper ends of the bins of distance, metres.
 const BINS_M: [f64; 14] = [
     0.06, 0.1, 0.15, 0.2, 0.3, 0.4, 0.55, 0.75, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0,
 ];
-/// Points that are compared with one another.
+/// Points of one lidar within a square of this side are one: most of them lie close beneath it, where
+/// the noise of the measurement hides what little heights differ, metres.
+const PATCH_M: f64 = 0.1;
+/// Patches that are compared with one another.
 const SAMPLE: usize = 3000;
 /// Fewer pairs than this say nothing of a bin.
 const LEAST_PAIRS: usize = 200;
@@ -26,10 +31,34 @@ pub struct Sample {
     pub group: usize,
 }
 
+/// Means over patches, each of one group.
+fn patches(samples: &[Sample]) -> Vec<Sample> {
+    let mut sums: BTreeMap<(usize, [i64; 2]), (f64, Sample)> = BTreeMap::new();
+    for sample in samples {
+        let cell = sample.place_m.map(|t| (t / PATCH_M).floor() as i64);
+        sums.entry((sample.group, cell))
+            .and_modify(|(count, sum)| {
+                *count += 1.0;
+                (0..2).for_each(|k| sum.place_m[k] += sample.place_m[k]);
+                sum.height_m += sample.height_m;
+                sum.noise_m2 += sample.noise_m2;
+            })
+            .or_insert((1.0, *sample));
+    }
+    let mean = |(count, sum): (f64, Sample)| Sample {
+        place_m: sum.place_m.map(|t| t / count),
+        height_m: sum.height_m / count,
+        noise_m2: sum.noise_m2 / (count * count),
+        group: sum.group,
+    };
+    sums.into_values().map(mean).collect()
+}
+
 /// Semivariances by bin of distance, without the noise of the measurement.
 fn semivariances(samples: &[Sample]) -> Vec<(f64, f64, f64)> {
-    let thin = samples.len().div_ceil(SAMPLE).max(1);
-    let chosen: Vec<&Sample> = samples.iter().step_by(thin).collect();
+    let patches = patches(samples);
+    let thin = patches.len().div_ceil(SAMPLE).max(1);
+    let chosen: Vec<&Sample> = patches.iter().step_by(thin).collect();
     let mut bins = [(0usize, 0.0, 0.0); BINS_M.len()];
     for (k, a) in chosen.iter().enumerate() {
         for b in chosen[..k].iter().filter(|b| b.group == a.group) {

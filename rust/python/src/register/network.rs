@@ -320,6 +320,7 @@ fn lidar(raw: &RawLidar) -> LidarState {
         scale: 0.0,
         offsets_m: vec![0.0; raw.channels],
         retro_m: 0.0,
+        slant_m: 0.0,
     }
 }
 
@@ -355,6 +356,7 @@ fn described<'py>(
         entry.set_item("scale", lidar.scale)?;
         entry.set_item("offsets_m", lidar.offsets_m.clone().into_pyarray(py))?;
         entry.set_item("retro_m", lidar.retro_m)?;
+        entry.set_item("slant_m", lidar.slant_m)?;
         entry.set_item("at", *at)?;
         lidars.append(entry)?;
     }
