@@ -139,7 +139,15 @@ fn started(mesh: &Mesh, poses: &[WorldFromSensor], seen: &[Arc<Seen>]) -> Adjust
         sigma(k % (RIG + CHANNELS)).powi(2)
     }));
     let channels = vec![CHANNELS; poses.len()];
-    let rig = Rig::new(poses.to_vec(), channels, DVector::zeros(size), covariance).unwrap();
+    let clock_s = vec![1e-4; poses.len()];
+    let rig = Rig::new(
+        poses.to_vec(),
+        channels,
+        clock_s,
+        DVector::zeros(size),
+        covariance,
+    )
+    .unwrap();
     let weights = Weights {
         noise_m: vec![0.015; poses.len()],
         surface_m: 0.002,

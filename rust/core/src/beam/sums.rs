@@ -231,7 +231,7 @@ mod tests {
         let moves = DMatrix::from_fn(MOVES * 4, STATE.len(), |i, j| number(31 * i + 7 * j));
         let mut sums = Sums::new(4, 8..20, &free);
         let mut expected = DMatrix::<f64>::zeros(20, 20);
-        let mut right = vec![0.0; 20];
+        let mut right = [0.0; 20];
         for k in 0..200 {
             let others: Vec<(usize, f64)> = [9, 10 + k / 40, 19, 25]
                 .map(|i| (i, number(k + 13 * i)))
