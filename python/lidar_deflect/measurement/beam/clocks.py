@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
@@ -50,8 +50,13 @@ def unknown(kinds: Sequence[str]) -> Floats:
     return np.array([FREE_S[kind] for kind in kinds])
 
 
-def combined(kinds: Sequence[str], news: Iterable[Any]) -> ClockOffsets:
-    """Put together what stretches tell, each as its information (1/s^2) and that times offsets."""
+def combined(kinds: Sequence[str], news: Sequence[Any]) -> ClockOffsets:
+    """Put together what stretches tell, each as its information (1/s^2) and that times offsets.
+
+    Where nothing moves nothing is told, and the clocks are taken for right.
+    """
+    if not news:
+        return ClockOffsets(tuple(kinds), np.zeros(len(kinds)), np.zeros(len(kinds)))
     before = unknown(kinds)
     held = 1.0 / before**2
     held /= np.linalg.norm(held)
@@ -64,8 +69,13 @@ def combined(kinds: Sequence[str], news: Iterable[Any]) -> ClockOffsets:
     return ClockOffsets(tuple(kinds), covariance @ right, np.sqrt(np.diag(covariance)))
 
 
-def fastest(shares: Sequence[Floats]) -> list[int]:
-    """Numbers of the stretches in which the load changes fastest, given their loads at moments."""
+def telling(shares: Sequence[Floats], *, swings: bool) -> list[int]:
+    """Return numbers of stretches that tell the clocks, given the loads at their moments.
+
+    They are those in which the load changes fastest; of a blade that is swung, some of all.
+    """
+    if swings:
+        return list(range(0, len(shares), max(1, -(-len(shares) // MOST))))
     pace = np.array([np.ptp(share) / max(len(share) - 1, 1) for share in shares])
     order = np.argsort(-pace, kind="stable")[:MOST]
     return [int(place) for place in np.sort(order) if pace[place] > 0.0]

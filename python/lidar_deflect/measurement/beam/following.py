@@ -99,8 +99,8 @@ def follow(
     loads = expected.at(times_ns)
     stretches = _stretches(times_ns, in_hold, loads)
     spans = [_span(times_ns, inside) for inside in stretches]
-    moving = clocks.fastest([loads[inside] for inside in stretches])
-    offsets = _clocks(inputs, expected, solved, [spans[place] for place in moving])
+    telling = clocks.telling([loads[inside] for inside in stretches], swings=expected.swings)
+    offsets = _clocks(inputs, expected, solved, [spans[place] for place in telling])
     feed = reading(inputs, solved.plan, spans)
     for start in range(0, len(stretches), CHUNK):
         part = stretches[start : start + CHUNK]
