@@ -1,9 +1,10 @@
 //! The beam method: a blade that bends as blades bend, fitted to rays and edges of all lidars.
 //!
 //! [`design`] and [`mesh`] hold the drawing, [`equilibrium`], [`tangent`] and [`family`] say which states it can
-//! have, [`axis`] keeps its length, [`sight`] meets it with rays and scan planes, [`adjust`] puts
+//! have, [`axis`] keeps its length, [`sight`] and [`silhouette`] meet it with rays and scan planes, [`adjust`] puts
 //! everything into one adjustment, [`common`] says what neighbouring data share, [`track`] follows the blade between
-//! holds and [`carry`] tells how well each instant is known. Source: docs/method.md.
+//! holds, [`clocks`] compares the lidars' clocks while it moves, and [`carry`] tells how well each instant is
+//! known. Source: docs/method.md.
 
 pub mod adjust;
 pub mod axis;
@@ -31,6 +32,7 @@ mod sample;
 pub mod sections;
 pub mod shape;
 pub mod sight;
+pub mod silhouette;
 pub mod solution;
 pub mod start;
 pub mod step;

@@ -8,7 +8,8 @@ use super::echoes::{Echo, Edge};
 use super::layout::RIG;
 use super::posed::{Posed, node_slopes};
 use super::rig::Lidar;
-use super::sight::{Contact, Hit, ScanPlane, Silhouette};
+use super::sight::{Contact, Hit};
+use super::silhouette::{ScanPlane, Silhouette};
 use super::sums::{BOTH, Part, Row, Sums};
 use super::weights::{EdgeMet, Tally, Used, faded, robust};
 
