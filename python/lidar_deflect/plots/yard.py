@@ -27,7 +27,7 @@ def yard_residuals(result: HasTables) -> go.Figure:
         for k in range(len(_NAMES)):
             figure.add_trace(_class(cells, lidar, k, row == 1), row=row, col=1)
         across = words.PLOT["x"] if cells["across"] == "x_m" else words.PLOT["y"]
-        title = f"{style.text(cells['surface'])}, {style.text(lidar)}: {across}"
+        title = f"{style.text(cells['surface'])} {style.text(lidar)}<br>{across}"
         figure.update_yaxes(title_text=title, row=row, col=1)
     figure.update_xaxes(title_text=words.PLOT["z_along_the_blade"], row=len(wanted), col=1)
     figure.update_layout(height=190 * len(wanted) + 90)

@@ -266,7 +266,7 @@ def _label(trace: Mapping[str, Any]) -> str:
 
 def _plain(word: Any) -> str:
     """Undo the escapes that plotly needs, and shorten what would leave the page."""
-    found = html.unescape(str(word))
+    found = html.unescape(str(word).replace("<br>", "\n"))
     return found if len(found) <= _LONGEST else found[: _LONGEST - 1] + "…"
 
 
