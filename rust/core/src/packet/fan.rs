@@ -278,6 +278,12 @@ impl Desk {
         }
     }
 
+    /// Range of an echo.
+    #[inline]
+    pub fn range(&self, lane: usize, echo: usize) -> i32 {
+        self.range.as_flattened()[echo * self.chunks * LANES + lane]
+    }
+
     /// Appends the returns of a firing.
     ///
     /// Targets nearer than so many metres are shot by the second fan, which has the same beams at other times.
