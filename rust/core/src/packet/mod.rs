@@ -7,6 +7,7 @@
 pub mod aim;
 pub mod beams;
 pub mod echoes;
+pub mod fan;
 pub mod frames;
 pub mod hesai;
 pub mod leishen;

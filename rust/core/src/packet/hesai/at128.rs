@@ -10,9 +10,10 @@ use std::sync::LazyLock;
 
 use super::dat::{self, Cursor};
 use super::layout::{Frame, Header, Layout, Tail, View, flag};
-use super::rotating::{Family, Firing, Ray, Rotating, firings};
+use super::rotating::{Family, Firing, Rotating, firings, ray};
 use super::unit::{FireTimes, Unit};
 use crate::error::UnitError;
+use crate::packet::fan::{Beam, Desk, Fan};
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{Decoded, Decoder, Place, ReturnMode};
 
@@ -121,9 +122,8 @@ impl Family for At128 {
                 None => (Fields::of(&unit), calibration),
             };
             let times = unit.fire("fire").cloned().unwrap_or_default();
-            let decoder = Box::new(At128Decoder { fields, times });
             Ok(Fitted {
-                decoder,
+                decoder: Box::new(At128Decoder::new(fields, times)),
                 calibration,
             })
         };
@@ -210,36 +210,67 @@ impl Fields {
         self.fields_rad.iter().find_map(within)
     }
 
-    /// Where a channel points that fires at once.
-    fn ray(&self, channel: usize, since_rad: f64, encoder_rad: f64) -> Option<Ray> {
-        let adjust = |table: &[f64]| interpolate(table, channel, encoder_rad);
-        let azimuth_rad =
-            2.0 * since_rad - self.azimuth_rad.get(channel)? + adjust(&self.azimuth_adjust_rad);
-        let elevation_rad = self.elevation_rad[channel] + adjust(&self.elevation_adjust_rad);
-        Some(Ray {
-            laser: channel,
-            azimuth_rad,
-            azimuth: azimuth_rad.sin_cos(),
-            elevation: elevation_rad.sin_cos(),
-            delay_ns: 0,
-        })
+    /// Beams of the channels, azimuths after twice the way since the field's start.
+    fn beams(&self, encoder_rad: f64, times: &FireTimes) -> impl Iterator<Item = Beam> {
+        let between = Between::at(encoder_rad);
+        let angles = self.azimuth_rad.iter().zip(&self.elevation_rad).zip(times);
+        angles
+            .enumerate()
+            .map(move |(channel, ((azimuth_rad, elevation_rad), delay_ns))| {
+                let azimuth_rad = between.of(&self.azimuth_adjust_rad, channel) - azimuth_rad;
+                let elevation_rad = elevation_rad + between.of(&self.elevation_adjust_rad, channel);
+                let elevation = elevation_rad.sin_cos();
+                ray(channel, azimuth_rad, elevation, delay_ns.unwrap_or(0.0))
+            })
+    }
+
+    fn is_adjusted(&self) -> bool {
+        !(self.azimuth_adjust_rad.is_empty() && self.elevation_adjust_rad.is_empty())
     }
 }
 
-/// A channel's correction at an angle of the encoder.
-fn interpolate(table: &[f64], channel: usize, encoder_rad: f64) -> f64 {
-    let Some(row) = table.chunks_exact(ADJUSTS).nth(channel) else {
-        return 0.0;
-    };
-    let place = (encoder_rad / TAU).rem_euclid(1.0) * ADJUSTS as f64;
-    let below = place as usize % ADJUSTS;
-    let share = place.fract();
-    row[below] * (1.0 - share) + row[(below + 1) % ADJUSTS] * share
+/// Between which of the corrections an angle of the encoder lies.
+#[derive(Debug, Clone, Copy)]
+struct Between {
+    below: usize,
+    share: f64,
+}
+
+impl Between {
+    fn at(encoder_rad: f64) -> Self {
+        let place = (encoder_rad / TAU).rem_euclid(1.0) * ADJUSTS as f64;
+        Self {
+            below: place as usize % ADJUSTS,
+            share: place.fract(),
+        }
+    }
+
+    /// A channel's correction.
+    fn of(self, table: &[f64], channel: usize) -> f64 {
+        let Some(row) = table.chunks_exact(ADJUSTS).nth(channel) else {
+            return 0.0;
+        };
+        let above = row[(self.below + 1) % ADJUSTS];
+        row[self.below] * (1.0 - self.share) + above * self.share
+    }
 }
 
 struct At128Decoder {
     fields: Fields,
     times: FireTimes,
+    fan: Fan,
+    desk: Desk,
+}
+
+impl At128Decoder {
+    fn new(fields: Fields, times: FireTimes) -> Self {
+        Self {
+            fan: fields.beams(0.0, &times).collect(),
+            fields,
+            times,
+            desk: Desk::default(),
+        }
+    }
 }
 
 impl Decoder for At128Decoder {
@@ -260,21 +291,18 @@ impl Decoder for At128Decoder {
                 out.drops.add("block_invalid", returns as u64);
                 continue;
             };
+            if self.fields.is_adjusted() {
+                self.fan.set(self.fields.beams(encoder_rad, &self.times));
+            }
             let firing = Firing {
                 first,
                 encoder_rad: At128.encoder_rad(&view, first).unwrap_or_default(),
+                azimuth_rad: 2.0 * since_rad,
                 time: place.time + (At128.block_ns(&view, first) - At128.block_ns(&view, 0)),
                 least_range: 1,
                 packet: place.packet,
             };
-            firing.place(&view, out, |channel, _| {
-                let delay_ns = self.times.get(channel)?.unwrap_or(0.0);
-                let ray = self.fields.ray(channel, since_rad, encoder_rad)?;
-                Some(Ray {
-                    delay_ns: delay_ns.round() as i64,
-                    ..ray
-                })
-            });
+            firing.place(&view, &self.fan, None, &mut self.desk, out);
         }
     }
 }
@@ -327,10 +355,12 @@ mod tests {
         let fields = Fields::read(&file()).unwrap();
         let encoder_rad = 41.0_f64.to_radians();
         let since_rad = fields.since_start(encoder_rad).unwrap();
-        let ray = fields.ray(1, since_rad, encoder_rad).unwrap();
+        let times = vec![None; CHANNELS];
+        let beam = fields.beams(encoder_rad, &times).nth(1).unwrap();
         // 2 x (41 - 23.0747) - 0.65 + half way between 0.2 and 0.4 degrees.
         let expected_deg = 2.0 * (41.0 - 295_356.0 / 12_800.0) - 0.65 + 0.3;
-        assert!((ray.azimuth_rad.to_degrees() - expected_deg).abs() < 1e-4);
+        let azimuth_rad = 2.0 * since_rad + beam.azimuth_rad;
+        assert!((azimuth_rad.to_degrees() - expected_deg).abs() < 1e-4);
         // The last field runs over the seam.
         let over_seam = fields.since_start(5.0_f64.to_radians()).unwrap();
         assert!((over_seam.to_degrees() - (365.0 - 3_368_105.0 / 12_800.0)).abs() < 1e-6);

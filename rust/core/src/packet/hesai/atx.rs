@@ -9,9 +9,10 @@ use std::sync::LazyLock;
 
 use super::dat::{self, Cursor};
 use super::layout::{self, Header, Layout, Tail, View, flag};
-use super::rotating::{Family, Firing, Ray, Rotating, firings};
+use super::rotating::{Family, Firing, Rotating, firings, ray};
 use super::unit::{FireTimes, OBTAIN, Unit};
 use crate::error::UnitError;
+use crate::packet::fan::{Beam, Desk, Fan};
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{Decoded, Decoder, Place, ReturnMode};
 
@@ -133,7 +134,7 @@ impl Family for Atx {
             let (unit, _) = NOMINAL.clone().with(files)?;
             let times = ["even", "odd"].map(|name| unit.fire(name).cloned().unwrap_or_default());
             Ok(Fitted {
-                decoder: Box::new(AtxDecoder { angles, times }),
+                decoder: Box::new(AtxDecoder::new(angles, times)),
                 calibration: Calibration::of(&used, nominal),
             })
         };
@@ -212,37 +213,36 @@ impl Angles {
         })
     }
 
-    fn ray(&self, channel: usize, block_rad: f64, frame: &Scan<'_>) -> Option<Ray> {
-        let delay_ns = frame.times.get(channel)?.unwrap_or(0.0);
-        let azimuth_rad = block_rad
-            + self.azimuth_rad[usize::from(frame.is_odd)].get(channel)?
-            + delay_ns * frame.shift_rad_per_ns;
-        Some(Ray {
-            laser: channel,
-            azimuth_rad,
-            azimuth: azimuth_rad.sin_cos(),
-            elevation: *self.elevation.get(channel)?,
-            delay_ns: delay_ns.round() as i64,
-        })
+    /// Beams of the channels, azimuths after the block's.
+    fn beams(&self, scan: &Scan, times: &FireTimes) -> impl Iterator<Item = Beam> {
+        let azimuths = &self.azimuth_rad[usize::from(scan.is_odd)];
+        let angles = azimuths.iter().zip(&self.elevation).zip(times);
+        let shift_rad_per_ns = scan.shift_rad_per_ns;
+        angles
+            .enumerate()
+            .map(move |(channel, ((azimuth_rad, elevation), delay_ns))| {
+                let delay_ns = delay_ns.unwrap_or(0.0);
+                let azimuth_rad = azimuth_rad + delay_ns * shift_rad_per_ns;
+                ray(channel, azimuth_rad, *elevation, delay_ns)
+            })
     }
 }
 
 /// What the frames differ in.
-struct Scan<'a> {
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Scan {
     is_odd: bool,
-    times: &'a FireTimes,
     /// Turn of the mirror while a channel waits.
     shift_rad_per_ns: f64,
 }
 
-impl<'a> Scan<'a> {
-    fn of(view: &View<'_>, times: &'a [FireTimes; 2]) -> Self {
+impl Scan {
+    fn of(view: &View<'_>) -> Self {
         let is_odd = is_odd(view);
         // Degrees are nanoseconds x speed x 1e-9 / 8, forth in even frames and back in odd ones.
         let shift_rad_per_ns = (view.rpm().abs() * 1e-9 / 8.0).to_radians();
         Self {
             is_odd,
-            times: &times[usize::from(is_odd)],
             shift_rad_per_ns: if is_odd {
                 -shift_rad_per_ns
             } else {
@@ -256,6 +256,30 @@ struct AtxDecoder {
     angles: Angles,
     /// Of even and of odd frames.
     times: [FireTimes; 2],
+    /// The beams of both as they were last.
+    fans: [(Option<Scan>, Fan); 2],
+    desk: Desk,
+}
+
+impl AtxDecoder {
+    fn new(angles: Angles, times: [FireTimes; 2]) -> Self {
+        Self {
+            angles,
+            times,
+            fans: Default::default(),
+            desk: Desk::default(),
+        }
+    }
+
+    /// Brings the beams of even or of odd frames to a speed.
+    fn aim(&mut self, scan: Scan) {
+        let (known, fan) = &mut self.fans[usize::from(scan.is_odd)];
+        if *known != Some(scan) {
+            let times = &self.times[usize::from(scan.is_odd)];
+            fan.set(self.angles.beams(&scan, times));
+            *known = Some(scan);
+        }
+    }
 }
 
 impl Decoder for AtxDecoder {
@@ -266,21 +290,21 @@ impl Decoder for AtxDecoder {
         let Some(view) = view else {
             return out.drops.add("packet_size", 1);
         };
-        let frame = Scan::of(&view, &self.times);
+        let scan = Scan::of(&view);
+        self.aim(scan);
+        let (_, fan) = &self.fans[usize::from(scan.is_odd)];
         let left_over = view.layout().blocks % view.return_mode().returns();
         out.drops.add("block_invalid", left_over as u64);
         for first in firings(&view) {
-            let block_rad = f64::from(view.azimuth(first)) * RAD_PER_UNIT;
             let firing = Firing {
                 first,
                 encoder_rad: Atx.encoder_rad(&view, first).unwrap_or_default(),
+                azimuth_rad: f64::from(view.azimuth(first)) * RAD_PER_UNIT,
                 time: place.time + Atx.block_ns(&view, first),
                 least_range: 1,
                 packet: place.packet,
             };
-            firing.place(&view, out, |channel, _| {
-                self.angles.ray(channel, block_rad, &frame)
-            });
+            firing.place(&view, fan, None, &mut self.desk, out);
         }
     }
 }

@@ -9,11 +9,10 @@ use std::f64::consts::TAU;
 
 use super::dat::{self, Cursor};
 use super::layout::{Layout, MAGIC, NOWHERE, RawPacket, Tail, View, write};
+use super::rotating::ray;
 use super::unit::OBTAIN;
-use crate::cloud::Return;
 use crate::error::UnitError;
-use crate::packet::aim::wrapped;
-use crate::packet::echoes::judge;
+use crate::packet::fan::{Desk, Fan, Row, from_y, single_kind};
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{
     Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
@@ -206,7 +205,10 @@ impl Model for Ft120 {
         let grid = file.map_or_else(|| Ok(Grid::nominal()), Grid::read)?;
         let used: Vec<&UnitFile> = file.into_iter().collect();
         Ok(Fitted {
-            decoder: Box::new(Ft120Decoder { grid }),
+            decoder: Box::new(Ft120Decoder {
+                fans: (0..COLUMNS).map(|column| grid.fan(column)).collect(),
+                desk: Desk::default(),
+            }),
             calibration: Calibration::of(&used, Calibration::Nominal { obtain: OBTAIN }),
         })
     }
@@ -259,41 +261,48 @@ impl Grid {
     }
 }
 
+impl Grid {
+    /// The beams of a column.
+    fn fan(&self, column: usize) -> Fan {
+        let pixels = self.0.iter().skip(column * ROWS).take(ROWS).enumerate();
+        let beam = |(row, (azimuth_rad, elevation_rad)): (usize, &(f64, f64))| {
+            ray(row, *azimuth_rad, elevation_rad.sin_cos(), 0.0)
+        };
+        pixels.map(beam).collect()
+    }
+}
+
 struct Ft120Decoder {
-    grid: Grid,
+    /// By column.
+    fans: Vec<Fan>,
+    desk: Desk,
 }
 
 impl Decoder for Ft120Decoder {
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let Some(packet) = Packet::new(payload) else {
+        let packet = Packet::new(payload);
+        let known = packet.and_then(|packet| Some((self.fans.get(packet.column)?, packet)));
+        let Some((fan, packet)) = known else {
             return out.drops.add("packet_size", 1);
         };
-        let unit_m = packet.view.layout().unit_m;
-        let pixels = &self.grid.0[packet.column * ROWS + packet.first..];
-        let mode = packet.view.return_mode();
-        for ((number, echo), (azimuth_rad, elevation_rad)) in
-            packet.view.echoes(0).enumerate().zip(pixels)
-        {
-            let ([Some(return_kind), ..], _) = judge(mode, &[echo]) else {
-                continue;
-            };
-            let range_m = f64::from(echo.range) * unit_m;
-            let ((sin, cos), (sin_v, cos_v)) = (azimuth_rad.sin_cos(), elevation_rad.sin_cos());
-            let level_m = range_m * cos_v;
-            out.encoder_rad.push(wrapped(packet.azimuth_rad()));
-            out.cloud.push(&Return {
-                xyz_m: [level_m * sin, level_m * cos, range_m * sin_v].map(|v| v as f32),
-                time: place.time,
-                range_m: range_m as f32,
-                azimuth_rad: wrapped(*azimuth_rad),
-                ring: (packet.first + number) as u16,
-                intensity: echo.intensity.into(),
-                return_index: 0,
-                return_kind,
-                packet: place.packet,
-                block: packet.column as u16,
-            });
-        }
+        self.desk.open(fan.len(), 1);
+        let echoes = self.desk.echoes(0);
+        echoes.block.fill(packet.column as u16);
+        let (ranges, intensities) = (&mut echoes.range[packet.first..], echoes.intensity);
+        packet
+            .view
+            .read(0, 1, ranges, &mut intensities[packet.first..]);
+        let row = Row {
+            encoder_rad: packet.azimuth_rad(),
+            azimuth_rad: 0.0,
+            axes: from_y((0.0, 1.0)),
+            origin_m: [0.0; 3],
+            unit_m: packet.view.layout().unit_m,
+            time_ns: place.time.0,
+            packets: [place.packet; 3],
+        };
+        let return_kind = single_kind(packet.view.return_mode());
+        self.desk.push_single(fan, None, &row, return_kind, out);
     }
 }
 

@@ -267,6 +267,18 @@ impl<'a> View<'a> {
         })
     }
 
+    /// Reads ranges and brightnesses of a block by channel; ranges below the least are no echo.
+    pub fn read(&self, block: usize, least: u16, ranges: &mut [i32], intensities: &mut [u16]) {
+        let bytes = &self.block(block)[self.layout.echoes..];
+        let length = self.layout.channels * self.layout.echo_len;
+        let bytes = &bytes[..length.min(bytes.len())];
+        match self.layout.echo_len {
+            3 => read(bytes.as_chunks::<3>().0, least, ranges, intensities),
+            4 => read(bytes.as_chunks::<4>().0, least, ranges, intensities),
+            len => read(bytes.chunks_exact(len), least, ranges, intensities),
+        }
+    }
+
     fn tail(&self) -> &'a [u8] {
         &self.payload[self.layout.tail..]
     }
@@ -329,6 +341,25 @@ impl<'a> View<'a> {
             _ => u32_at(self.tail(), sequence),
         };
         self.layout.has_sequence.then(read)
+    }
+}
+
+/// Reads echoes of a size that the compiler may know.
+#[inline(always)]
+fn read<'a, E: AsRef<[u8]> + ?Sized + 'a>(
+    echoes: impl IntoIterator<Item = &'a E>,
+    least: u16,
+    ranges: &mut [i32],
+    intensities: &mut [u16],
+) {
+    let room = ranges.iter_mut().zip(intensities);
+    for ((range, intensity), echo) in room.zip(echoes) {
+        let [low, high, brightness, ..] = *echo.as_ref() else {
+            continue;
+        };
+        let raw = u16::from_le_bytes([low, high]);
+        *range = if raw < least { 0 } else { raw.into() };
+        *intensity = brightness.into();
     }
 }
 

@@ -4,21 +4,21 @@
 //! fires. Blocks of one firing share an azimuth; which of them holds the nearer return differs from
 //! model to model.
 
+mod decoder;
+
 use std::f64::consts::{PI, TAU};
 use std::fmt::Debug;
 
 use super::channels::Channels;
 use super::layout::{Layout, RawPacket, View, write};
 use super::unit::{self, Kind, Unit};
-use crate::cloud::Return;
 use crate::error::UnitError;
-use crate::packet::aim::{add, wrapped};
 use crate::packet::echoes::{MOST, RawEcho, judge};
 use crate::packet::unit::{Fitted, UnitFile};
-use crate::packet::{
-    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
-};
-use crate::time::Timestamp;
+use crate::packet::{Counting, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
+
+use decoder::RotatingDecoder;
+pub use decoder::{Firing, ray};
 
 const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 
@@ -267,228 +267,4 @@ fn shots<'a>(
         }
         echoes
     })
-}
-
-/// Where a channel points and when it fires.
-#[derive(Debug, Clone, Copy, Default)]
-struct Aim {
-    /// Azimuth after the block's.
-    azimuth_rad: f64,
-    sin_cos: (f64, f64),
-    delay_ns: i64,
-}
-
-/// Aims of all channels in one way to fire, at one speed.
-#[derive(Debug, Clone)]
-struct Aims {
-    rpm: f64,
-    aims: Vec<Aim>,
-}
-
-struct RotatingDecoder<F> {
-    family: F,
-    azimuth_rad: Vec<f64>,
-    elevation: Vec<(f64, f64)>,
-    delays_ns: Vec<Vec<f64>>,
-    aims: Vec<Aims>,
-    channels: Option<Channels>,
-    near_m: f64,
-}
-
-impl<F: Family> RotatingDecoder<F> {
-    fn new(family: F, unit: &Unit, channels: Option<Channels>) -> Self {
-        let lasers = unit.elevation_rad.len();
-        let times = unit.fire_times.iter();
-        let times = times.map(|(_, times)| times.iter().map(|ns| ns.unwrap_or(0.0)).collect());
-        let mut delays_ns: Vec<Vec<f64>> = times.collect();
-        if delays_ns.is_empty() {
-            delays_ns.push(vec![0.0; lasers]);
-        }
-        let never = Aims {
-            rpm: f64::NAN,
-            aims: vec![Aim::default(); lasers],
-        };
-        Self {
-            family,
-            azimuth_rad: unit.azimuth_rad.clone(),
-            elevation: unit
-                .elevation_rad
-                .iter()
-                .map(|angle| angle.sin_cos())
-                .collect(),
-            aims: vec![never; delays_ns.len()],
-            delays_ns,
-            channels,
-            near_m: unit.near_m.unwrap_or(family.near_m()),
-        }
-    }
-
-    /// Lasers of the channels of a firing; `None` where nothing tells them.
-    fn lasers(&self, view: &View<'_>, first: usize) -> Option<Lasers<'_>> {
-        let channels = view.layout().channels;
-        let told = self.family.chosen_loop(view, first).and_then(|number| {
-            let known = self.channels.as_ref()?;
-            known.of(number, channels)
-        });
-        match told {
-            Some(lasers) => Some(Lasers::Chosen(lasers)),
-            None => (channels == self.elevation.len()).then_some(Lasers::All),
-        }
-    }
-
-    /// Brings the aims of one way to fire to a speed.
-    fn aim(&mut self, table: usize, rpm: f64) -> usize {
-        let table = table.min(self.aims.len() - 1);
-        let aims = &mut self.aims[table];
-        if aims.rpm != rpm {
-            aims.rpm = rpm;
-            let channels = self.azimuth_rad.iter().zip(&self.delays_ns[table]);
-            for (aim, (offset_rad, delay_ns)) in aims.aims.iter_mut().zip(channels) {
-                let azimuth_rad = offset_rad + delay_ns * rpm * TAU / 60e9;
-                *aim = Aim {
-                    azimuth_rad,
-                    sin_cos: azimuth_rad.sin_cos(),
-                    delay_ns: delay_ns.round() as i64,
-                };
-            }
-        }
-        table
-    }
-
-    fn firing(&mut self, view: &View<'_>, first: usize, place: Place, out: &mut Decoded) {
-        let Some(block_rad) = self.family.azimuth_rad(view, first) else {
-            return out
-                .drops
-                .add("block_invalid", view.return_mode().returns() as u64);
-        };
-        let (far, near) = self.family.fire_times(view, first);
-        let [far, near] = [far, near].map(|table| self.aim(table, view.rpm()));
-        let Some(lasers) = self.lasers(view, first) else {
-            return out
-                .drops
-                .add("channels_unknown", view.return_mode().returns() as u64);
-        };
-        let (head, near_m) = (block_rad.sin_cos(), self.near_m);
-        let firing = Firing {
-            first,
-            encoder_rad: self.family.encoder_rad(view, first).unwrap_or(block_rad),
-            time: place.time + (self.family.block_ns(view, first) - self.family.block_ns(view, 0)),
-            least_range: self.family.least_range(),
-            packet: place.packet,
-        };
-        firing.place(view, out, |channel, range_m| {
-            let table = if range_m < near_m { near } else { far };
-            let laser = lasers.of(channel)?;
-            let aim = self.aims[table].aims.get(laser)?;
-            Some(Ray {
-                laser,
-                azimuth_rad: block_rad + aim.azimuth_rad,
-                azimuth: add(head, aim.sin_cos),
-                elevation: self.elevation[laser],
-                delay_ns: aim.delay_ns,
-            })
-        });
-    }
-}
-
-/// Lasers of the channels of a block.
-#[derive(Debug, Clone, Copy)]
-enum Lasers<'a> {
-    /// All, in their order.
-    All,
-    /// A choice of them.
-    Chosen(&'a [usize]),
-}
-
-impl Lasers<'_> {
-    #[inline]
-    fn of(self, channel: usize) -> Option<usize> {
-        match self {
-            Self::All => Some(channel),
-            Self::Chosen(lasers) => lasers.get(channel).copied(),
-        }
-    }
-}
-
-/// Where a shot goes and when, after its firing.
-#[derive(Debug, Clone, Copy)]
-pub struct Ray {
-    /// Number of the laser, 0-based.
-    pub laser: usize,
-    /// Azimuth, not far outside of one turn.
-    pub azimuth_rad: f64,
-    /// Its sine and cosine.
-    pub azimuth: (f64, f64),
-    /// Sine and cosine of the elevation.
-    pub elevation: (f64, f64),
-    /// After the firing.
-    pub delay_ns: i64,
-}
-
-/// One firing of all channels.
-#[derive(Debug, Clone, Copy)]
-pub struct Firing {
-    /// First of its blocks.
-    pub first: usize,
-    /// Azimuth on the scale on which sweeps are cut.
-    pub encoder_rad: f64,
-    /// When it began.
-    pub time: Timestamp,
-    /// Least value of a range that is an echo.
-    pub least_range: u16,
-    /// Number of the packet.
-    pub packet: u32,
-}
-
-impl Firing {
-    /// Places the echoes; `ray` gives the ray of a channel for a range in metres, `None` for no such channel.
-    pub fn place(
-        &self,
-        view: &View<'_>,
-        out: &mut Decoded,
-        ray: impl Fn(usize, f64) -> Option<Ray>,
-    ) {
-        let mode = view.return_mode();
-        let unit_m = view.layout().unit_m;
-        for (channel, echoes) in shots(view, self.first, self.least_range).enumerate() {
-            let (kinds, merged) = judge(mode, &echoes[..mode.returns()]);
-            out.merged += u64::from(merged);
-            for (number, (echo, kind)) in echoes.iter().zip(kinds).enumerate() {
-                let range_m = f64::from(echo.range) * unit_m;
-                let (Some(return_kind), Some(ray)) = (kind, ray(channel, range_m)) else {
-                    continue;
-                };
-                let ((sin, cos), (sin_v, cos_v)) = (ray.azimuth, ray.elevation);
-                let level_m = range_m * cos_v;
-                out.encoder_rad.push(wrapped(self.encoder_rad));
-                out.cloud.push(&Return {
-                    xyz_m: [level_m * sin, level_m * cos, range_m * sin_v].map(|v| v as f32),
-                    time: self.time + ray.delay_ns,
-                    range_m: range_m as f32,
-                    azimuth_rad: wrapped(ray.azimuth_rad),
-                    ring: ray.laser as u16,
-                    intensity: echo.intensity.into(),
-                    return_index: number as u8,
-                    return_kind,
-                    packet: self.packet,
-                    block: (self.first + number) as u16,
-                });
-            }
-        }
-    }
-}
-
-impl<F: Family> Decoder for RotatingDecoder<F> {
-    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let layout = self.family.layout(payload);
-        let Some(view) = layout.and_then(|layout| View::new(payload, layout)) else {
-            return out.drops.add("packet_size", 1);
-        };
-        let returns = view.return_mode().returns();
-        out.drops
-            .add("block_invalid", (view.layout().blocks % returns) as u64);
-        for first in firings(&view) {
-            self.firing(&view, first, place, out);
-        }
-    }
 }

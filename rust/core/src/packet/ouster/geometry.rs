@@ -2,82 +2,89 @@
 //!
 //! Source: the maker's sensor manual, "lidar range to XYZ".
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::metadata::Metadata;
+use crate::packet::fan::{Beam, Fan};
 
-/// One beam: the factors of its direction, worked out once.
-#[derive(Debug, Clone, Copy)]
-struct Beam {
-    /// Cosine of the elevation times cosine and sine of the beam's own azimuth.
-    level: (f64, f64),
-    /// Sine of the elevation.
-    up: f64,
-    azimuth_rad: f64,
-}
+/// Axes of the sensor frame from those of the rotor, and where the rotor's origin lies, metres.
+type Frame = ([[f64; 3]; 3], [f64; 3]);
 
-/// All beams of one sensor.
+/// All beams and columns of one sensor.
 #[derive(Debug, Clone)]
 pub struct Geometry {
     beams: Vec<Beam>,
-    /// Cosine and sine of the encoder's angle, by column.
-    columns: Vec<(f64, f64)>,
-    origin_mm: (f64, f64),
-    /// Way from the lidar's origin to where ranges count from, mm.
-    reach_mm: f64,
-    to_sensor_mm: [f64; 16],
+    frames: Vec<Frame>,
 }
 
 impl Geometry {
     /// Works out the tables of a sensor.
     pub fn new(metadata: &Metadata) -> Self {
-        let angles = metadata.elevation_rad.iter().zip(&metadata.azimuth_rad);
-        let beams = angles.map(|(elevation_rad, azimuth_rad)| Beam {
-            level: (
-                elevation_rad.cos() * azimuth_rad.cos(),
-                -elevation_rad.cos() * azimuth_rad.sin(),
-            ),
-            up: elevation_rad.sin(),
-            azimuth_rad: *azimuth_rad,
-        });
         let columns = metadata.columns_per_turn;
-        let angle_rad = |column: usize| TAU * (1.0 - column as f64 / columns as f64);
-        let (out_mm, up_mm) = metadata.beam_origin_mm;
+        let frame = |column: usize| {
+            let angle_rad = TAU * (1.0 - column as f64 / columns as f64);
+            turned(&metadata.lidar_to_sensor_mm, angle_rad.sin_cos())
+        };
         Self {
-            beams: beams.collect(),
-            columns: (0..columns)
-                .map(|column| (angle_rad(column).cos(), angle_rad(column).sin()))
-                .collect(),
-            origin_mm: (out_mm, up_mm),
-            reach_mm: if up_mm == 0.0 {
-                out_mm
-            } else {
-                out_mm.hypot(up_mm)
-            },
-            to_sensor_mm: metadata.lidar_to_sensor_mm,
+            beams: beams(metadata).collect(),
+            frames: (0..columns).map(frame).collect(),
         }
     }
 
-    /// Position in metres and azimuth, clockwise from the encoder's zero; `None` outside of the tables.
-    #[inline]
-    pub fn place(&self, column: usize, ring: usize, range_mm: u32) -> Option<([f32; 3], f64)> {
-        let (beam, (cos, sin)) = (self.beams.get(ring)?, *self.columns.get(column)?);
-        let reach_mm = f64::from(range_mm) - self.reach_mm;
-        let (ahead, aside) = beam.level;
-        let x = reach_mm * (cos * ahead - sin * aside) + self.origin_mm.0 * cos;
-        let y = reach_mm * (sin * ahead + cos * aside) + self.origin_mm.0 * sin;
-        let z = reach_mm * beam.up + self.origin_mm.1;
-        let m = &self.to_sensor_mm;
-        let row = |at: usize| (m[at] * x + m[at + 1] * y + m[at + 2] * z + m[at + 3]) * 0.001;
-        let turned_rad = TAU * column as f64 / self.columns.len() as f64;
-        let xyz_m = [row(0) as f32, row(4) as f32, row(8) as f32];
-        Some((xyz_m, turned_rad + beam.azimuth_rad))
+    /// The beams, from the top one, in the frame that turns with the encoder.
+    pub fn fan(&self) -> Fan {
+        self.beams.iter().copied().collect()
     }
+
+    /// How that frame stands in a column; `None` where the turn has no such column.
+    pub fn frame(&self, column: usize) -> Option<Frame> {
+        self.frames.get(column).copied()
+    }
+}
+
+/// Ranges count from the lidar's origin, along the beam from where it leaves.
+fn beams(metadata: &Metadata) -> impl Iterator<Item = Beam> {
+    let (out_mm, up_mm) = metadata.beam_origin_mm;
+    let reach_mm = if up_mm == 0.0 {
+        out_mm
+    } else {
+        out_mm.hypot(up_mm)
+    };
+    let angles = metadata.elevation_rad.iter().zip(&metadata.azimuth_rad);
+    let angles = (0_u16..).zip(angles);
+    angles.map(move |(ring, (elevation_rad, azimuth_rad))| {
+        let ((up, level), (sin, cos)) = (elevation_rad.sin_cos(), azimuth_rad.sin_cos());
+        let direction = [level * cos, -level * sin, up];
+        let origin_mm = [out_mm, 0.0, up_mm];
+        let origin_m = |axis: usize| (origin_mm[axis] - reach_mm * direction[axis]) * 0.001;
+        Beam {
+            ring,
+            azimuth_rad: (azimuth_rad + PI).rem_euclid(TAU) - PI,
+            direction,
+            origin_m: [0, 1, 2].map(origin_m),
+            ..Beam::default()
+        }
+    })
+}
+
+/// The sensor frame from one that is turned in the lidar frame.
+fn turned(to_sensor_mm: &[f64; 16], (sin, cos): (f64, f64)) -> Frame {
+    let row = |axis: usize| {
+        let [x, y, z, _] = [0, 1, 2, 3].map(|column| to_sensor_mm[4 * axis + column]);
+        [x * cos + y * sin, y * cos - x * sin, z]
+    };
+    let origin_m = |axis: usize| to_sensor_mm[4 * axis + 3] * 0.001;
+    ([0, 1, 2].map(row), [0, 1, 2].map(origin_m))
 }
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
     use super::*;
+    use crate::cloud::ReturnKind;
+    use crate::packet::Decoded;
+    use crate::packet::fan::{Desk, Row};
     use crate::packet::unit::UnitFile;
 
     #[test]
@@ -88,7 +95,23 @@ mod tests {
             .unwrap()
             .unwrap();
         let geometry = Geometry::new(&metadata);
-        let ([x, y, z], azimuth_rad) = geometry.place(256, 0, 10_000).unwrap();
+        let (axes, origin_m) = geometry.frame(256).unwrap();
+        let row = Row {
+            encoder_rad: FRAC_PI_2,
+            azimuth_rad: FRAC_PI_2,
+            axes,
+            origin_m,
+            unit_m: 0.001,
+            time_ns: 0,
+            packets: [0; 3],
+        };
+        let (mut desk, mut out) = (Desk::default(), Decoded::default());
+        desk.open(1, 1);
+        desk.echoes(0).range[0] = 10_000;
+        let kind = ReturnKind::Strongest;
+        desk.push_single(&geometry.fan(), None, &row, kind, &mut out);
+        let [x, y, z] = out.cloud.xyz_m[0];
+        let azimuth_rad = f64::from(out.cloud.azimuth_rad[0]);
         // A quarter turn clockwise: the encoder looks along -y of the lidar, which is +y of the sensor.
         let (level, own) = (9.985 * 30_f64.to_radians().cos(), 3_f64.to_radians());
         assert!((f64::from(x) - level * own.sin()).abs() < 1e-6, "{x}");
@@ -100,7 +123,7 @@ mod tests {
             (f64::from(z) - (9.985 * 0.5 + 0.036_18)).abs() < 1e-6,
             "{z}"
         );
-        assert!((azimuth_rad.to_degrees() - 93.0).abs() < 1e-9);
-        assert!(geometry.place(1024, 0, 1).is_none() && geometry.place(0, 1, 1).is_none());
+        assert!((azimuth_rad.to_degrees() - 93.0).abs() < 1e-4);
+        assert!(geometry.frame(1024).is_none());
     }
 }

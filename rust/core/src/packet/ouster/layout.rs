@@ -265,11 +265,16 @@ impl<'a> Column<'a> {
         }
     }
 
+    /// Bytes of all pixels, from the top beam.
+    pub fn body(&self) -> &'a [u8] {
+        let start = self.layout.column_header_len();
+        let length = self.layout.pixels * self.layout.pixel_len;
+        self.bytes.get(start..start + length).unwrap_or(&[])
+    }
+
     /// Bytes of the pixels, from the top beam.
     pub fn pixels(&self) -> impl Iterator<Item = &'a [u8]> + use<'a> {
-        let start = self.layout.column_header_len().min(self.bytes.len());
-        let pixels = self.bytes[start..].chunks_exact(self.layout.pixel_len.max(1));
-        pixels.take(self.layout.pixels)
+        self.body().chunks_exact(self.layout.pixel_len.max(1))
     }
 }
 

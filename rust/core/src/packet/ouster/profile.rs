@@ -109,6 +109,40 @@ impl Field {
         (word >> (self.bit % 8) & ((1 << self.bits) - 1)) << self.shift
     }
 
+    /// Its values in pixels of so many bytes that follow each other, as `make` has them. No field
+    /// reaches over the end of a word.
+    pub fn read_each<T>(
+        self,
+        pixels: &[u8],
+        pixel_len: usize,
+        room: &mut [T],
+        make: impl Fn(u32) -> T,
+    ) {
+        // Where the compiler knows the size, it reads several pixels at once.
+        match pixel_len {
+            4 => self.words(pixels.as_chunks::<4>().0, room, make),
+            8 => self.words(pixels.as_chunks::<8>().0, room, make),
+            12 => self.words(pixels.as_chunks::<12>().0, room, make),
+            16 => self.words(pixels.as_chunks::<16>().0, room, make),
+            len => self.words(pixels.chunks_exact(len.max(1)), room, make),
+        }
+    }
+
+    #[inline(always)]
+    fn words<'a, P: AsRef<[u8]> + ?Sized + 'a, T>(
+        self,
+        pixels: impl IntoIterator<Item = &'a P>,
+        room: &mut [T],
+        make: impl Fn(u32) -> T,
+    ) {
+        let (first, down, mask) = (self.bit / 32 * 4, self.bit % 32, (1 << self.bits) - 1);
+        for (slot, pixel) in room.iter_mut().zip(pixels) {
+            let word = pixel.as_ref().get(first..).and_then(<[u8]>::first_chunk);
+            let word = word.map_or(0, |bytes| u32::from_le_bytes(*bytes));
+            *slot = make((word >> down & mask) << self.shift);
+        }
+    }
+
     /// Writes a value into a pixel; what does not fit is cut off.
     pub fn write(self, pixel: &mut [u8], value: u32) {
         let mask = ((1_u64 << self.bits) - 1) << (self.bit % 8);
@@ -140,6 +174,24 @@ mod tests {
             for echo in profile.echoes {
                 assert_eq!(echo.range.read(&pixel), echo.range.most(), "{profile:?}");
                 assert_eq!(echo.reflectivity.read(&pixel), 0x5C, "{profile:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_read_at_once_are_those_read_one_by_one() {
+        for profile in PROFILES {
+            let length = 5 * profile.pixel_len;
+            let bytes: Vec<u8> = (0..length).map(|place| (place * 37 % 251) as u8).collect();
+            let fields = profile.echoes.iter();
+            for field in fields.flat_map(|echo| [echo.range, echo.reflectivity]) {
+                let mut each = [0; 5];
+                field.read_each(&bytes, profile.pixel_len, &mut each, |value| value);
+                let single = bytes.chunks_exact(profile.pixel_len);
+                assert!(
+                    single.map(|pixel| field.read(pixel)).eq(each),
+                    "{profile:?}"
+                );
             }
         }
     }

@@ -3,18 +3,17 @@
 use std::f64::consts::TAU;
 use std::sync::Mutex;
 
-use super::geometry::Geometry;
+mod decoder;
+
 use super::layout::{Column, View};
 use super::metadata::{self, Metadata};
 use super::{OBTAIN, Span};
-use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
-use crate::packet::aim::wrapped;
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{
-    Counting, Decoded, Decoder, Head, Misfit, Model, ModelRef, PacketKind, Place, ReturnMode,
-    Tally, UnitFacts,
+    Counting, Head, Misfit, Model, ModelRef, PacketKind, ReturnMode, Tally, UnitFacts,
 };
+use decoder::UnitDecoder;
 
 /// Frames of the counter that all firmwares have; wider ones are cut to it.
 const FRAMES: usize = 1 << 16;
@@ -231,97 +230,8 @@ impl Model for Unit {
 
     fn fit(&self, _files: &[UnitFile]) -> Result<Fitted, UnitError> {
         Ok(Fitted {
-            decoder: Box::new(UnitDecoder {
-                geometry: Geometry::new(&self.metadata),
-                unit: self.clone(),
-            }),
+            decoder: Box::new(UnitDecoder::new(self.clone())),
             calibration: Calibration::of(&[&self.file], Calibration::Nominal { obtain: OBTAIN }),
         })
-    }
-}
-
-struct UnitDecoder {
-    unit: Unit,
-    geometry: Geometry,
-}
-
-impl UnitDecoder {
-    /// Meanings of the echoes of a pixel; `None` for no echo and for one that repeats the first.
-    fn kinds(&self, echoes: [(u32, u32); 2]) -> [Option<ReturnKind>; 2] {
-        let [(one, _), (other, _)] = echoes;
-        let mode = self.unit.metadata.return_mode;
-        let by_distance = |is_near: bool| {
-            if is_near {
-                ReturnKind::First
-            } else {
-                ReturnKind::Last
-            }
-        };
-        match (one != 0, other != 0) {
-            (true, true) if one == other => [Some(ReturnKind::Merged), None],
-            (true, true) if mode == ReturnMode::FirstLast => [
-                Some(by_distance(one < other)),
-                Some(by_distance(other < one)),
-            ],
-            (is_one, is_other) => {
-                let first = match mode {
-                    ReturnMode::Last => ReturnKind::Last,
-                    ReturnMode::First => ReturnKind::First,
-                    _ => ReturnKind::Strongest,
-                };
-                [
-                    is_one.then_some(first),
-                    is_other.then_some(ReturnKind::Second),
-                ]
-            }
-        }
-    }
-}
-
-impl Decoder for UnitDecoder {
-    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let view = self.unit.view(payload);
-        let Some((view, span)) = view.and_then(|view| Some((view, Span::of(&view)?))) else {
-            return out.drops.add("packet_size", 1);
-        };
-        let turn = self.unit.metadata.columns_per_turn as f64;
-        for column in view.columns() {
-            if !column.is_valid() {
-                out.drops.add("column_invalid", 1);
-                continue;
-            }
-            let number = column.number();
-            let since_ns = i64::try_from(column.time_ns())
-                .unwrap_or(i64::MAX)
-                .saturating_sub(span.time_ns);
-            let encoder_rad = wrapped(TAU * f64::from(number) / turn);
-            for (ring, pixel) in column.pixels().enumerate() {
-                let echoes = self.unit.echoes(pixel);
-                let kinds = self.kinds(echoes);
-                out.merged += u64::from(kinds[0] == Some(ReturnKind::Merged));
-                for (index, ((range_mm, brightness), kind)) in
-                    echoes.into_iter().zip(kinds).enumerate()
-                {
-                    let Some(kind) = kind else { continue };
-                    let spot = self.geometry.place(usize::from(number), ring, range_mm);
-                    let Some((xyz_m, azimuth_rad)) = spot else {
-                        continue;
-                    };
-                    out.cloud.push(&Return {
-                        xyz_m,
-                        time: place.time + since_ns,
-                        range_m: (f64::from(range_mm) * 0.001) as f32,
-                        azimuth_rad: wrapped(azimuth_rad.rem_euclid(TAU)),
-                        ring: ring as u16,
-                        intensity: brightness as u16,
-                        return_index: index as u8,
-                        return_kind: kind,
-                        packet: place.packet,
-                        block: number,
-                    });
-                    out.encoder_rad.push(encoder_rad);
-                }
-            }
-        }
     }
 }

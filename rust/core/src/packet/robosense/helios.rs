@@ -252,17 +252,19 @@ pub fn returns_in_pairs(view: &View<'_>) -> usize {
     1 + usize::from(is_dual)
 }
 
+/// Ranges of the 16 lasers in the two halves of a block.
+fn halves(view: &View<'_>, block: usize) -> impl Iterator<Item = (u16, u16)> {
+    let ranges = view.ranges(block);
+    ranges.clone().take(16).zip(ranges.skip(16))
+}
+
 /// Two returns stand in the halves of a block. A shot with one echo has it twice, which shots that follow
 /// each other hardly ever do.
 pub fn returns_in_halves(view: &View<'_>) -> usize {
     const LEAST: usize = 24;
     let (mut both, mut same) = (0, 0);
     for block in 0..view.blocks() {
-        for laser in 0..16 {
-            let (one, other) = (
-                view.echo(block, laser).range,
-                view.echo(block, laser + 16).range,
-            );
+        for (one, other) in halves(view, block) {
             both += usize::from(one != 0 && other != 0);
             same += usize::from(one != 0 && one == other);
         }
@@ -280,11 +282,7 @@ pub fn halves_agree(layout: Layout, packets: &[&[u8]]) -> Option<bool> {
         .filter_map(|payload| View::new(payload, layout))
     {
         for block in 0..view.blocks() {
-            for laser in 0..16 {
-                let (one, other) = (
-                    view.echo(block, laser).range,
-                    view.echo(block, laser + 16).range,
-                );
+            for (one, other) in halves(&view, block) {
                 let is_both = one != 0 && other != 0;
                 both += usize::from(is_both);
                 near += usize::from(is_both && one.abs_diff(other) <= one / 50 + 20);

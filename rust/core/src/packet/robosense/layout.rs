@@ -1,6 +1,6 @@
 //! Data packets (MSOP): a header, blocks of channels that each begin with a mark and an azimuth, a tail.
 
-use std::ops::Range;
+use std::ops::{Range, RangeInclusive};
 
 use crate::packet::echoes::RawEcho;
 use crate::packet::hesai::date;
@@ -163,6 +163,38 @@ impl<'a> View<'a> {
         RawEcho {
             range: big(bytes, start..start + 2) as u16 & self.layout.range_mask,
             intensity: big(bytes, start + 2..start + 3) as u8,
+        }
+    }
+
+    fn channels(&self, block: usize) -> &'a [[u8; ECHO_LEN]] {
+        let bytes = self.block(block).get(BLOCK_HEADER_LEN..);
+        bytes.map_or(&[], |bytes| bytes.as_chunks().0)
+    }
+
+    /// Ranges of a block by channel, in the model's unit.
+    pub fn ranges(&self, block: usize) -> impl Iterator<Item = u16> + Clone + use<'a> {
+        let mask = self.layout.range_mask;
+        let channels = self.channels(block).iter();
+        channels.map(move |[high, low, _]| u16::from_be_bytes([*high, *low]) & mask)
+    }
+
+    /// Reads ranges and brightnesses of a block from a channel on; ranges outside of `kept` are no echo.
+    pub fn read(
+        &self,
+        block: usize,
+        channel: usize,
+        kept: &RangeInclusive<u16>,
+        ranges: &mut [i32],
+        intensities: &mut [u16],
+    ) {
+        let (least, most) = (*kept.start(), *kept.end());
+        let channels = self.channels(block).iter().skip(channel);
+        let room = ranges.iter_mut().zip(intensities);
+        for ((range, intensity), [high, low, brightness]) in room.zip(channels) {
+            let raw = u16::from_be_bytes([*high, *low]) & self.layout.range_mask;
+            let is_kept = raw >= least && raw <= most;
+            *range = if is_kept { raw.into() } else { 0 };
+            *intensity = (*brightness).into();
         }
     }
 

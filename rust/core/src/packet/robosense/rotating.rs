@@ -3,21 +3,19 @@
 //! The packet's time is that of the first laser of its first block. A point's azimuth is the block's, plus
 //! what the rotor turns until the laser fires, plus the laser's own.
 
+mod decoder;
 mod turn;
 
 use std::fmt::Debug;
 
 use super::difop::{self, Angles, Difop};
 use super::layout::{Layout, RawPacket, View, encode};
-use crate::cloud::Return;
 use crate::error::UnitError;
-use crate::packet::aim::{wrapped, wrapped_far};
-use crate::packet::echoes::{RawEcho, judge};
-use crate::packet::split::{Following, Half, Split};
+use crate::packet::echoes::RawEcho;
+use crate::packet::split::{Half, Split};
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
-use crate::packet::{
-    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
-};
+use crate::packet::{Counting, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
+use decoder::RotatingDecoder;
 use turn::Turn;
 
 /// How to get the angles of a unit.
@@ -136,26 +134,6 @@ pub trait Family: Send + Sync + Debug + Copy + 'static {
 #[derive(Debug)]
 pub struct Rotating<F>(pub F);
 
-/// The echoes of one shot.
-#[derive(Debug, Clone, Copy, Default)]
-struct Shot {
-    firing: usize,
-    slot: Slot,
-    echoes: [RawEcho; 2],
-    blocks: [usize; 2],
-    /// The second return lies in the packet that follows.
-    is_shared: bool,
-}
-
-/// Which firings of a packet to visit.
-#[derive(Debug, Clone, Copy, Default)]
-struct Ends<'a> {
-    /// The first one was taken with the packet before.
-    is_lead_taken: bool,
-    /// The packet that has the second return of the last one.
-    next: Option<View<'a>>,
-}
-
 impl<F: Family> Rotating<F> {
     fn view<'a>(&self, payload: &'a [u8]) -> Option<View<'a>> {
         View::new(payload, self.0.layout())
@@ -185,43 +163,23 @@ fn cut<F: Family>(family: &F, view: &View<'_>, mut echo: RawEcho) -> RawEcho {
     echo
 }
 
-/// Visits all shots with an echo in the order of firings and slots.
-fn visit<F: Family>(
-    family: &F,
-    view: &View<'_>,
-    turn: &Turn,
-    ends: Ends<'_>,
-    mut take: impl FnMut(&Shot),
-) {
-    let returns = family.returns(view);
-    let mut shots: Vec<Shot> = Vec::new();
-    for firing in usize::from(ends.is_lead_taken)..turn.firings() {
-        shots.clear();
-        shots.resize(2 * family.lasers(), Shot::default());
-        let mut fill = |view: &View<'_>, block: usize, place: usize, is_shared: bool| {
+/// Ranges of the two echoes of all shots of a packet, by firing, shot and laser.
+fn ranges<F: Family>(family: &F, view: &View<'_>) -> Vec<[u16; 2]> {
+    let turn = Turn::of(family, view, 0.0);
+    let (returns, shots) = (family.returns(view), 2 * family.lasers());
+    let mut ranges = vec![[0; 2]; turn.firings() * shots];
+    for (firing, ranges) in ranges.chunks_exact_mut(shots.max(1)).enumerate() {
+        for (block, place) in turn.blocks_of(firing) {
             for channel in 0..view.layout().channels {
                 let slot = family.slot(returns, place, channel);
-                let number = slot.shot * family.lasers() + slot.laser;
-                let (Some(shot), true) = (shots.get_mut(number), slot.echo < 2) else {
-                    continue;
-                };
-                shot.firing = firing;
-                shot.slot = slot;
-                shot.echoes[slot.echo] = cut(family, view, view.echo(block, channel));
-                shot.blocks[slot.echo] = block;
-                shot.is_shared |= is_shared;
+                let shot = ranges.get_mut(slot.shot * family.lasers() + slot.laser);
+                if let Some(range) = shot.and_then(|shot| shot.get_mut(slot.echo)) {
+                    *range = cut(family, view, view.echo(block, channel)).range;
+                }
             }
-        };
-        let blocks = turn.blocks_of(firing);
-        let held = blocks.map(|(block, place)| fill(view, block, place, false));
-        let held = held.count();
-        let is_last = firing + 1 == turn.firings();
-        if let Some(next) = ends.next.as_ref().filter(|_| is_last && turn.has_tail()) {
-            fill(next, 0, held, true);
         }
-        let is_echo = |shot: &&Shot| shot.echoes.iter().any(|echo| echo.range != 0);
-        shots.iter().filter(is_echo).for_each(&mut take);
     }
+    ranges
 }
 
 impl<F: Family> Model for Rotating<F> {
@@ -292,11 +250,9 @@ impl<F: Family> Model for Rotating<F> {
         let Some(view) = self.view(payload) else {
             return tally;
         };
-        let turn = Turn::of(&self.0, &view, 0.0);
-        visit(&self.0, &view, &turn, Ends::default(), |shot| {
-            let [one, other] = shot.echoes;
-            tally.add_pair(one.range, other.range);
-        });
+        for [one, other] in ranges(&self.0, &view) {
+            tally.add_pair(one, other);
+        }
         tally
     }
 
@@ -414,146 +370,4 @@ impl<F: Family> Model for Rotating<F> {
 struct Settings {
     mode: Option<ReturnMode>,
     rpm: Option<u16>,
-}
-
-/// One laser.
-#[derive(Debug, Clone, Copy)]
-struct Laser {
-    ring: u16,
-    elevation: (f64, f64),
-    azimuth_rad: f64,
-}
-
-struct RotatingDecoder<F> {
-    family: F,
-    lasers: Vec<Laser>,
-    settings: Settings,
-    /// Number of the packet whose first block was taken with the packet before.
-    taken: Option<u32>,
-}
-
-impl<F: Family> RotatingDecoder<F> {
-    fn new(family: F, angles: &Angles, settings: Settings) -> Self {
-        let elevations = &angles.elevation_rad;
-        // Rings count from the lowest laser; of equal ones the first is lower.
-        let ring = |laser: usize| {
-            let below = |other: &usize| {
-                let order = elevations[*other].total_cmp(&elevations[laser]);
-                order.is_lt() || order.is_eq() && *other < laser
-            };
-            (0..elevations.len()).filter(below).count() as u16
-        };
-        let lasers = elevations.iter().zip(&angles.azimuth_rad).enumerate();
-        let lasers = lasers.map(|(laser, (elevation_rad, azimuth_rad))| Laser {
-            ring: ring(laser),
-            elevation: elevation_rad.sin_cos(),
-            azimuth_rad: *azimuth_rad,
-        });
-        Self {
-            family,
-            lasers: lasers.collect(),
-            settings,
-            taken: None,
-        }
-    }
-
-    /// The packet that follows, where its first block is of the firing of this packet's last one.
-    fn shared<'a>(
-        &self,
-        view: &View<'_>,
-        turn: &Turn,
-        following: Option<Following<'a>>,
-    ) -> Option<(View<'a>, u32)> {
-        let following = following.filter(|_| turn.has_tail())?;
-        let next = View::new(following.payload, self.family.layout())?;
-        let is_shared = self.family.returns(&next) == self.family.returns(view)
-            && Turn::of(&self.family, &next, 0.0).has_lead()
-            && next.azimuth(0) == view.azimuth(view.blocks() - 1);
-        is_shared.then_some((next, following.packet))
-    }
-
-    /// The mode of a packet: what the unit says, unless the packet has another number of returns.
-    fn mode_of(&self, returns: usize) -> ReturnMode {
-        let told = self.settings.mode.filter(|mode| mode.returns() == returns);
-        told.unwrap_or(match returns {
-            1 => ReturnMode::Strongest,
-            _ => ReturnMode::Dual,
-        })
-    }
-
-    fn position(&self, laser: &Laser, range_m: f64, azimuth_rad: f64) -> [f32; 3] {
-        let lens = self.family.lens();
-        let (sin, cos) = azimuth_rad.sin_cos();
-        let (sin_own, cos_own) = (azimuth_rad + laser.azimuth_rad).sin_cos();
-        let (up, level) = laser.elevation;
-        let ahead = range_m * level * cos_own + lens.out_m * cos;
-        let right = range_m * level * sin_own + lens.out_m * sin;
-        [
-            ahead as f32,
-            -right as f32,
-            (range_m * up + lens.up_m) as f32,
-        ]
-    }
-}
-
-impl<F: Family> Decoder for RotatingDecoder<F> {
-    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        self.decode_before(payload, None, place, out);
-    }
-
-    fn decode_before(
-        &mut self,
-        payload: &[u8],
-        following: Option<Following<'_>>,
-        place: Place,
-        out: &mut Decoded,
-    ) {
-        let Some(view) = View::new(payload, self.family.layout()) else {
-            return out.drops.add("packet_size", 1);
-        };
-        out.drops.add(
-            "block_invalid",
-            (view.layout().blocks - view.blocks()) as u64,
-        );
-        let turn = Turn::of(&self.family, &view, place.mean_rate_rad_per_ns);
-        let turn = turn.with_speed(self.settings.rpm);
-        let (unit_m, mode) = (
-            self.family.unit_m(&view),
-            self.mode_of(self.family.returns(&view)),
-        );
-        let shared = self.shared(&view, &turn, following);
-        let ends = Ends {
-            is_lead_taken: self.taken == Some(place.packet),
-            next: shared.map(|(next, _)| next),
-        };
-        self.taken = shared.map(|(_, packet)| packet);
-        visit(&self.family, &view, &turn, ends, |shot| {
-            let Some(laser) = self.lasers.get(shot.slot.laser) else {
-                return;
-            };
-            let encoder_rad = turn.azimuth_rad(shot.firing);
-            let azimuth_rad = encoder_rad + turn.turned_until(shot.firing, shot.slot.delay_ns);
-            let (kinds, merged) = judge(mode, &shot.echoes);
-            out.merged += u64::from(merged);
-            for (index, kind) in kinds.iter().enumerate().take(2) {
-                let Some(kind) = kind else { continue };
-                let echo = shot.echoes[index];
-                let range_m = f64::from(echo.range) * unit_m;
-                let other = self.taken.filter(|_| shot.is_shared && index == 1);
-                out.cloud.push(&Return {
-                    xyz_m: self.position(laser, range_m, azimuth_rad),
-                    time: place.time + turn.start_ns(shot.firing) + shot.slot.delay_ns,
-                    range_m: range_m as f32,
-                    azimuth_rad: wrapped_far(azimuth_rad + laser.azimuth_rad),
-                    ring: laser.ring,
-                    intensity: echo.intensity.into(),
-                    return_index: index as u8,
-                    return_kind: *kind,
-                    packet: other.unwrap_or(place.packet),
-                    block: shot.blocks[index] as u16,
-                });
-                out.encoder_rad.push(wrapped(encoder_rad));
-            }
-        });
-    }
 }

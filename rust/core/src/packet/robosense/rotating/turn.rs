@@ -43,7 +43,16 @@ pub struct Turn {
 impl Turn {
     /// Finds the firings; `mean_rate_rad_per_ns` is the rate over the packets before, or 0.
     pub fn of<F: Family>(family: &F, view: &View<'_>, mean_rate_rad_per_ns: f64) -> Self {
-        let returns = family.returns(view);
+        Self::with_returns(family, view, family.returns(view), mean_rate_rad_per_ns)
+    }
+
+    /// The same where the returns of a shot are known.
+    pub fn with_returns<F: Family>(
+        family: &F,
+        view: &View<'_>,
+        returns: usize,
+        mean_rate_rad_per_ns: f64,
+    ) -> Self {
         let full = family.blocks_of_firing(returns).max(1);
         let mut turn = Self {
             first: [0; MOST + 1],
@@ -112,9 +121,8 @@ impl Turn {
             );
             *step = (to + 36_000 - from) % 36_000;
         }
-        for firing in 0..count {
-            let step_rad = self.azimuth_rad(firing + 1) - self.azimuth_rad(firing);
-            self.forth_rad[firing] = step_rad.rem_euclid(TAU);
+        for (forth_rad, step) in self.forth_rad.iter_mut().zip(steps) {
+            *forth_rad = f64::from(step) * RAD_PER_CENTIDEG;
         }
         let steps = &steps[..count];
         let mut sorted = [0; MOST];
@@ -159,15 +167,19 @@ impl Turn {
         f64::from(self.azimuth_centideg[firing]) * RAD_PER_CENTIDEG
     }
 
-    /// What the rotor turns within a firing until a shot.
-    pub fn turned_until(&self, firing: usize, delay_ns: i64) -> f64 {
+    /// What the rotor turns from a firing to the next.
+    pub fn step_rad(&self, firing: usize) -> f64 {
         let next = firing + 1;
         let is_last = next >= self.firings || self.gap.is_some_and(|(before, _)| before == firing);
-        let step_rad = if is_last {
+        if is_last {
             self.last_step_rad
         } else {
             self.forth_rad[firing]
-        };
+        }
+    }
+
+    /// What the rotor turns until a shot within a firing of this step.
+    pub fn turned_until(&self, step_rad: f64, delay_ns: i64) -> f64 {
         let turned_rad = step_rad * delay_ns as f64 / self.firing_ns;
         if self.is_on_grid {
             // Steps are whole hundredths; a quotient just below one is one.
