@@ -1,7 +1,7 @@
 //! Where a shot points: sine and cosine turned on by small angles, azimuths brought into one turn.
 
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI as HALF_TURN, TAU};
 use std::sync::LazyLock;
 
 /// Up to here sine and cosine of a small angle come from their series, to 3e-11.
@@ -55,6 +55,15 @@ pub fn wrapped_far(angle_rad: f64) -> f32 {
     } else {
         angle_rad.rem_euclid(TAU)
     })
+}
+
+/// The same direction, at most half a turn away.
+pub fn within_half_turn(angle_rad: f64) -> f64 {
+    if angle_rad.abs() <= HALF_TURN {
+        angle_rad
+    } else {
+        (angle_rad + HALF_TURN).rem_euclid(TAU) - HALF_TURN
+    }
 }
 
 /// Sine and cosine of whole hundredths of a degree.
@@ -143,6 +152,8 @@ mod tests {
         }
         assert_eq!(wrapped(TAU - 1e-9), 0.0);
         assert_eq!(wrapped(TAU + 0.5), 0.5);
+        assert_eq!(within_half_turn(-3.0), -3.0);
+        assert!((within_half_turn(100.0 * TAU + 4.0) - (4.0 - TAU)).abs() < 1e-12);
         for step in -4000..4000 {
             let angle = f64::from(step) * 0.01;
             assert_eq!(wrapped_far(angle), wrapped(angle.rem_euclid(TAU)));

@@ -5,6 +5,7 @@
 //! the library names a model.
 
 pub mod aim;
+pub mod batch;
 pub mod beams;
 pub mod echoes;
 pub mod fan;

@@ -297,7 +297,7 @@ impl Decoder for At128Decoder {
             let firing = Firing {
                 first,
                 encoder_rad: At128.encoder_rad(&view, first).unwrap_or_default(),
-                azimuth_rad: 2.0 * since_rad,
+                azimuth_rad: (2.0 * since_rad).rem_euclid(TAU),
                 time: place.time + (At128.block_ns(&view, first) - At128.block_ns(&view, 0)),
                 least_range: 1,
                 packet: place.packet,

@@ -6,24 +6,21 @@
 //!
 //! Source: the maker's driver and the manual of the CH128X1. No real packet was at hand.
 
-use std::f64::consts::{PI, TAU};
-
 use super::difop::{self, Difop};
 use super::mirror::{MIRRORS, Mirror};
 use super::pace;
 use super::paced::Units;
-use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
-use crate::packet::aim::wrapped;
 use crate::packet::hesai::date;
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
 use crate::packet::{
-    Counting, Decoded, Decoder, Head, LeftOut, Misfit, Model, ModelRef, PacketKind, Place,
-    ReturnMode, Tally,
+    Counting, Head, LeftOut, Misfit, Model, ModelRef, PacketKind, ReturnMode, Tally,
 };
-use crate::time::{NANOS_PER_SECOND, Timestamp};
+use crate::time::NANOS_PER_SECOND;
 
+mod decoder;
 mod packet;
+use decoder::ChDecoder;
 use packet::View;
 pub use packet::{RawPacket, RawRecord, Record};
 
@@ -308,111 +305,5 @@ impl Model for Ch {
             decoder: Box::new(ChDecoder::new(*self, told.map(|(_, angles)| angles))),
             calibration,
         })
-    }
-}
-
-/// Sines and cosines of one line's two angles.
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    first: (f64, f64),
-    second: (f64, f64),
-}
-
-struct ChDecoder {
-    ch: Ch,
-    lines: Vec<Line>,
-}
-
-impl ChDecoder {
-    /// With the offset of the prism and the angles of its faces that the unit tells.
-    fn new(ch: Ch, told: Option<[f64; 5]>) -> Self {
-        let mirror = ch.mirror;
-        let line = |line: usize| {
-            let (group, face) = (line / mirror.group, line % mirror.group);
-            let usual_deg = mirror.second_deg * face as f64;
-            let faces = told.filter(|angles| angles[1..].iter().any(|angle| *angle != 0.0));
-            let second_deg = faces.map_or(usual_deg, |angles| angles[1 + face % 4]);
-            let offset_deg = told
-                .filter(|_| group.is_multiple_of(2))
-                .map_or(0.0, |angles| angles[0]);
-            Line {
-                first: (mirror.first_deg(group) + offset_deg)
-                    .to_radians()
-                    .sin_cos(),
-                second: second_deg.to_radians().sin_cos(),
-            }
-        };
-        Self {
-            ch,
-            lines: (0..mirror.lines).map(line).collect(),
-        }
-    }
-
-    /// Direction of a shot.
-    fn direction(&self, line: &Line, azimuth_rad: f64) -> [f64; 3] {
-        let (sin_first, cos_first) = line.first;
-        let (sin_second, cos_second) = line.second;
-        let incidence = cos_second * cos_first * (azimuth_rad / 2.0).cos() - sin_second * sin_first;
-        let up = (sin_first + 2.0 * incidence * sin_second).clamp(-1.0, 1.0);
-        let level = (1.0 - up * up).sqrt();
-        let (sin, cos) = azimuth_rad.sin_cos();
-        [level * cos, level * sin, up]
-    }
-}
-
-/// Meanings of the echoes of a record: by distance where there are two.
-fn kinds([one, other]: [u32; 2], mode: ReturnMode) -> [Option<ReturnKind>; 2] {
-    let only = match mode {
-        ReturnMode::Strongest => ReturnKind::Strongest,
-        _ => ReturnKind::First,
-    };
-    match (one, other) {
-        (0, 0) => [None, None],
-        (0, _) => [None, Some(only)],
-        (_, 0) => [Some(only), None],
-        (one, other) if one == other => [Some(ReturnKind::Merged), None],
-        (one, other) if one < other => [Some(ReturnKind::First), Some(ReturnKind::Last)],
-        _ => [Some(ReturnKind::Last), Some(ReturnKind::First)],
-    }
-}
-
-impl Decoder for ChDecoder {
-    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let Some(view) = self.ch.view(payload) else {
-            return out.drops.add("packet_size", 1);
-        };
-        let mode = view.mode();
-        for (number, record) in view.numbered() {
-            let Some(line) = self.lines.get(usize::from(record.line)) else {
-                out.drops.add("line_unknown", 1);
-                continue;
-            };
-            let kinds = kinds(record.echoes.map(|echo| echo.0), mode);
-            out.merged += u64::from(kinds[0] == Some(ReturnKind::Merged));
-            let stated_deg = f64::from(record.azimuth) * 0.01;
-            let azimuth_rad = self.ch.mirror.azimuth_deg(stated_deg).to_radians();
-            let direction = self.direction(line, azimuth_rad);
-            let delay_ns = (number as f64 * self.ch.record_ns).round() as i64;
-            for (index, ((range, intensity), kind)) in
-                record.echoes.into_iter().zip(kinds).enumerate()
-            {
-                let Some(kind) = kind else { continue };
-                let range_m = f64::from(range) * packet::UNIT_M;
-                out.encoder_rad
-                    .push(wrapped(stated_deg.to_radians().rem_euclid(TAU)));
-                out.cloud.push(&Return {
-                    xyz_m: direction.map(|part| (range_m * part) as f32),
-                    time: Timestamp(place.time.0.saturating_add(delay_ns)),
-                    range_m: range_m as f32,
-                    azimuth_rad: wrapped(azimuth_rad.rem_euclid(2.0 * PI)),
-                    ring: record.line.into(),
-                    intensity: intensity.into(),
-                    return_index: index as u8,
-                    return_kind: kind,
-                    packet: place.packet,
-                    block: number as u16,
-                });
-            }
-        }
     }
 }

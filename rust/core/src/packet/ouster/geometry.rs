@@ -2,7 +2,7 @@
 //!
 //! Source: the maker's sensor manual, "lidar range to XYZ".
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use super::metadata::Metadata;
 use crate::packet::fan::{Beam, Fan};
@@ -59,7 +59,7 @@ fn beams(metadata: &Metadata) -> impl Iterator<Item = Beam> {
         let origin_m = |axis: usize| (origin_mm[axis] - reach_mm * direction[axis]) * 0.001;
         Beam {
             ring,
-            azimuth_rad: (azimuth_rad + PI).rem_euclid(TAU) - PI,
+            azimuth_rad: *azimuth_rad,
             direction,
             origin_m: [0, 1, 2].map(origin_m),
             ..Beam::default()

@@ -1,15 +1,16 @@
 //! From packets of the C series to returns: x right, y forward, azimuth 0 along y.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::{Cx, is_usable};
-use crate::cloud::{Return, ReturnKind};
-use crate::packet::aim::wrapped;
-use crate::packet::echoes::judge;
+use crate::packet::aim::{add, small_turn};
+use crate::packet::fan::{Beam, Desk, Fan, Known, Row, from_y};
 use crate::packet::leishen::difop::Difop;
 use crate::packet::leishen::products::Product;
-use crate::packet::velodyne::{BLOCKS, CHANNELS, RawReturn};
-use crate::packet::{Decoded, Decoder, Place, ReturnMode};
+use crate::packet::velodyne::{BLOCKS, CHANNELS, Packet};
+use crate::packet::{Decoded, Decoder, Place};
+
+const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 
 /// Channels of a C32W whose beams lie aside, and by how much.
 const ASIDE: [usize; 8] = [6, 7, 14, 15, 22, 23, 29, 30];
@@ -100,83 +101,86 @@ impl Lasers {
 #[derive(Debug, Clone, Copy)]
 struct Channel {
     ring: u16,
-    sin_elevation: f64,
-    cos_elevation: f64,
+    elevation: (f64, f64),
     azimuth_rad: f64,
+    azimuth: (f64, f64),
+    /// Direction from the axis to the lens.
+    lens: (f64, f64),
+    delay_ns: i64,
 }
 
 pub(super) struct CxDecoder {
     cx: Cx,
     channels: [Channel; CHANNELS],
-}
-
-/// Where one block points and when it began.
-struct Row {
-    azimuth_rad: f64,
-    step_rad: f64,
-    time_ns: i64,
-    block: usize,
+    /// By step to the next block.
+    fans: Known<f64>,
+    desk: Desk,
 }
 
 impl CxDecoder {
     pub fn new(cx: Cx, lasers: &Lasers) -> Self {
         let count = lasers.elevation_deg.len().max(1);
+        let behind_rad = cx.product.lens.1.to_radians();
         let channels = std::array::from_fn(|channel| {
             let laser = channel % count;
             let elevation_deg = lasers.elevation_deg.get(laser).copied().unwrap_or(0.0);
-            let (sin_elevation, cos_elevation) = elevation_deg.to_radians().sin_cos();
+            let azimuth_rad = lasers.azimuth_deg[channel].to_radians();
             Channel {
                 ring: lasers.ring(laser),
-                sin_elevation,
-                cos_elevation,
-                azimuth_rad: lasers.azimuth_deg[channel].to_radians(),
+                elevation: elevation_deg.to_radians().sin_cos(),
+                azimuth_rad,
+                azimuth: azimuth_rad.sin_cos(),
+                lens: (azimuth_rad - behind_rad).sin_cos(),
+                delay_ns: (channel as f64 * cx.shot_ns).round() as i64,
             }
         });
-        Self { cx, channels }
+        Self {
+            cx,
+            channels,
+            fans: Known::default(),
+            desk: Desk::default(),
+        }
     }
 
-    fn shot(
-        &self,
-        row: &Row,
-        channel: usize,
-        echoes: &[RawReturn],
-        mode: ReturnMode,
-        place: Place,
-        out: &mut Decoded,
-    ) {
-        let (kinds, merged) = judge(mode, echoes);
-        out.merged += u64::from(merged);
-        let beam = &self.channels[channel];
-        let encoder_rad = row.azimuth_rad + row.step_rad * channel as f64 / CHANNELS as f64;
-        let azimuth_rad = encoder_rad + beam.azimuth_rad;
-        let delay_ns = (channel as f64 * self.cx.shot_ns).round() as i64;
-        let (sin, cos) = azimuth_rad.sin_cos();
-        let (lens_m, behind_deg) = self.cx.product.lens;
-        let (lens_sin, lens_cos) = (azimuth_rad - behind_deg.to_radians()).sin_cos();
-        for (index, (echo, kind)) in echoes.iter().zip(kinds).enumerate() {
-            let Some(kind): Option<ReturnKind> = kind else {
-                continue;
-            };
-            let range_m = f64::from(echo.range) * self.cx.product.unit_m;
-            let level_m = range_m * beam.cos_elevation;
-            out.encoder_rad.push(wrapped(encoder_rad.rem_euclid(TAU)));
-            out.cloud.push(&Return {
-                xyz_m: [
-                    (level_m * sin + lens_m * lens_sin) as f32,
-                    (level_m * cos + lens_m * lens_cos) as f32,
-                    (range_m * beam.sin_elevation) as f32,
-                ],
-                time: crate::time::Timestamp(row.time_ns.saturating_add(delay_ns)),
-                range_m: range_m as f32,
-                azimuth_rad: wrapped(azimuth_rad.rem_euclid(TAU)),
-                ring: beam.ring,
-                intensity: echo.intensity.into(),
-                return_index: index as u8,
-                return_kind: kind,
-                packet: place.packet,
-                block: (row.block + index) as u16,
-            });
+    /// Lays a block's echoes on the desk, those of the return with this number.
+    fn fill(&mut self, packet: &Packet<'_>, block: usize, echo: usize) {
+        let room = self.desk.echoes(echo);
+        room.block.fill(block as u16);
+        let room = room.range.iter_mut().zip(room.intensity);
+        for ((range, intensity), raw) in room.zip(packet.echoes(block)) {
+            *range = raw.range.into();
+            *intensity = raw.intensity.into();
         }
+    }
+}
+
+/// The beams of a block, between which the rotor turns in equal steps.
+fn fan(channels: &[Channel; CHANNELS], step_rad: f64, lens_m: f64) -> Fan {
+    let beam = |(number, channel): (usize, &Channel)| {
+        let turned_rad = step_rad * number as f64 / CHANNELS as f64;
+        let turned = small_turn(turned_rad);
+        let ((sin, cos), (up, level)) = (add(channel.azimuth, turned), channel.elevation);
+        let (lens_sin, lens_cos) = add(channel.lens, turned);
+        Beam {
+            ring: channel.ring,
+            delay_ns: channel.delay_ns,
+            turned_rad,
+            azimuth_rad: turned_rad + channel.azimuth_rad,
+            direction: [level * cos, level * sin, up],
+            origin_m: [lens_m * lens_cos, lens_m * lens_sin, 0.0],
+        }
+    };
+    channels.iter().enumerate().map(beam).collect()
+}
+
+/// Steps between stated azimuths are whole hundredths of a degree, but for the rounding of their difference.
+fn on_grid(step_rad: f64) -> f64 {
+    let centideg = step_rad / RAD_PER_CENTIDEG;
+    let is_whole = (centideg - centideg.round()).abs() < 1e-6;
+    if is_whole {
+        centideg.round() * RAD_PER_CENTIDEG
+    } else {
+        step_rad
     }
 }
 
@@ -189,6 +193,7 @@ impl Decoder for CxDecoder {
         let stride = mode.returns();
         let rotation = self.cx.rotation(&packet, mode, place.mean_rate_rad_per_ns);
         let usual_rad = rotation.rate_rad_per_ns() * self.cx.row_ns();
+        let (lens_m, _) = self.cx.product.lens;
         for row in 0..BLOCKS / stride {
             let block = row * stride;
             if !is_usable(&packet, block) {
@@ -202,16 +207,21 @@ impl Decoder for CxDecoder {
             let step_rad = next
                 .filter(|step| *step < 2.0 * usual_rad)
                 .unwrap_or(usual_rad);
+            self.desk.open(CHANNELS, stride);
+            (0..stride).for_each(|echo| self.fill(&packet, block + echo, echo));
+            let step_rad = on_grid(step_rad);
+            let make = || fan(&self.channels, step_rad, lens_m);
+            let fan = self.fans.get(step_rad, make);
             let row = Row {
+                encoder_rad: azimuth_rad,
                 azimuth_rad,
-                step_rad,
+                axes: from_y(azimuth_rad.sin_cos()),
+                origin_m: [0.0; 3],
+                unit_m: self.cx.product.unit_m,
                 time_ns: place.time.0.saturating_add(rotation.start_ns(row)),
-                block,
+                packets: [place.packet; 3],
             };
-            let seconds = packet.returns(block + stride - 1);
-            for (channel, (one, other)) in packet.returns(block).zip(seconds).enumerate() {
-                self.shot(&row, channel, &[one, other][..stride], mode, place, out);
-            }
+            self.desk.push(fan, None, &row, mode, out);
         }
     }
 }

@@ -1,12 +1,11 @@
 //! From blocks of channels to returns: x forward, y left, azimuth clockwise from x.
 
-use std::f64::consts::{PI, TAU};
 use std::ops::RangeInclusive;
 
 use super::turn::Turn;
-use super::{Family, GUARD_M, Settings, Slot};
+use super::{Family, GUARD_M, Lens, Settings, Slot};
 use crate::packet::aim::{add, small_turn};
-use crate::packet::fan::{Beam, Desk, Fan, Row, from_x};
+use crate::packet::fan::{Beam, Desk, Known, Row, from_x};
 use crate::packet::robosense::difop::Angles;
 use crate::packet::robosense::layout::View;
 use crate::packet::split::Following;
@@ -96,17 +95,6 @@ impl Wiring {
     }
 }
 
-/// The beams of firings with one step to the next.
-#[derive(Debug, Clone)]
-struct Aimed {
-    returns: usize,
-    step_rad: f64,
-    fan: Fan,
-}
-
-/// Rotors keep within a few hundredths of a degree, so that few steps come again and again.
-const MOST_AIMED: usize = 32;
-
 pub(super) struct RotatingDecoder<F> {
     family: F,
     lasers: Vec<Laser>,
@@ -115,9 +103,8 @@ pub(super) struct RotatingDecoder<F> {
     taken: Option<u32>,
     /// For one and two returns.
     wirings: [Wiring; 2],
-    aimed: Vec<Aimed>,
-    /// Which of them is given up next.
-    oldest: usize,
+    /// By returns and step to the next firing.
+    fans: Known<(usize, f64)>,
     desk: Desk,
 }
 
@@ -137,7 +124,7 @@ impl<F: Family> RotatingDecoder<F> {
             .map(|(laser, (elevation_rad, azimuth_rad))| Laser {
                 ring: ring(laser),
                 elevation: elevation_rad.sin_cos(),
-                azimuth_rad: within_half_turn(*azimuth_rad),
+                azimuth_rad: *azimuth_rad,
                 azimuth: azimuth_rad.sin_cos(),
             })
             .collect();
@@ -147,8 +134,7 @@ impl<F: Family> RotatingDecoder<F> {
             lasers,
             settings,
             taken: None,
-            aimed: Vec::new(),
-            oldest: 0,
+            fans: Known::default(),
             desk: Desk::default(),
         }
     }
@@ -183,55 +169,19 @@ impl<F: Family> RotatingDecoder<F> {
         let units = |limit_m: f64| ((limit_m + GUARD_M) / unit_m) as u16;
         units(least_m).saturating_add(1)..=units(most_m)
     }
-
-    fn beam(&self, turn: &Turn, step_rad: f64, shot: Option<(usize, i64)>) -> Beam {
-        // What is not fired has no echo.
-        let Some((laser, delay_ns)) = shot else {
-            return Beam::default();
-        };
-        let (laser, lens) = (&self.lasers[laser], self.family.lens());
-        let turned_rad = turn.turned_until(step_rad, delay_ns);
-        let turned = small_turn(turned_rad);
-        let ((sin, cos), (up, level)) = (add(laser.azimuth, turned), laser.elevation);
-        Beam {
-            ring: laser.ring,
-            delay_ns,
-            turned_rad: 0.0,
-            azimuth_rad: turned_rad + laser.azimuth_rad,
-            direction: [level * cos, level * sin, up],
-            origin_m: [lens.out_m * turned.1, lens.out_m * turned.0, lens.up_m],
-        }
-    }
-
-    /// Number of the beams of a firing.
-    fn aim(&mut self, turn: &Turn, step_rad: f64, returns: usize) -> usize {
-        let is_same = |aimed: &Aimed| (aimed.step_rad, aimed.returns) == (step_rad, returns);
-        if let Some(known) = self.aimed.iter().position(is_same) {
-            return known;
-        }
-        let shots = self.wirings[returns - 1].shots.iter();
-        let fan = shots.map(|shot| self.beam(turn, step_rad, *shot)).collect();
-        let aimed = Aimed {
-            returns,
-            step_rad,
-            fan,
-        };
-        if self.aimed.len() < MOST_AIMED {
-            self.aimed.push(aimed);
-            return self.aimed.len() - 1;
-        }
-        self.oldest = (self.oldest + 1) % MOST_AIMED;
-        self.aimed[self.oldest] = aimed;
-        self.oldest
-    }
 }
 
-/// The same direction, at most half a turn away.
-fn within_half_turn(angle_rad: f64) -> f64 {
-    if angle_rad.abs() <= PI {
-        angle_rad
-    } else {
-        (angle_rad + PI).rem_euclid(TAU) - PI
+/// The beam of a laser that fires when the rotor has turned so far.
+fn beam(laser: &Laser, lens: Lens, turned_rad: f64, delay_ns: i64) -> Beam {
+    let turned = small_turn(turned_rad);
+    let ((sin, cos), (up, level)) = (add(laser.azimuth, turned), laser.elevation);
+    Beam {
+        ring: laser.ring,
+        delay_ns,
+        turned_rad: 0.0,
+        azimuth_rad: turned_rad + laser.azimuth_rad,
+        direction: [level * cos, level * sin, up],
+        origin_m: [lens.out_m * turned.1, lens.out_m * turned.0, lens.up_m],
     }
 }
 
@@ -262,8 +212,19 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
         let unit_m = self.family.unit_m(&view);
         let (mode, kept) = (self.mode_of(returns), self.kept(unit_m));
         for firing in usize::from(is_lead_taken)..turn.firings() {
-            let aimed = self.aim(&turn, turn.step_rad(firing), returns);
-            let (wiring, fan) = (&self.wirings[returns - 1], &self.aimed[aimed].fan);
+            let (wiring, step_rad) = (&self.wirings[returns - 1], turn.step_rad(firing));
+            let fan = self.fans.get((returns, step_rad), || {
+                let (lens, lasers) = (self.family.lens(), &self.lasers);
+                let aimed = |(laser, delay_ns): (usize, i64)| {
+                    let turned_rad = turn.turned_until(step_rad, delay_ns);
+                    beam(&lasers[laser], lens, turned_rad, delay_ns)
+                };
+                // What is not fired has no echo.
+                let shots = wiring.shots.iter();
+                shots
+                    .map(|shot| shot.map_or(Beam::default(), aimed))
+                    .collect()
+            });
             self.desk.open(fan.len(), returns);
             let mut held = 0;
             for block in turn.blocks_of(firing) {
