@@ -71,6 +71,11 @@ impl Fan {
     pub fn len(&self) -> usize {
         self.ring.len()
     }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.ring.is_empty()
+    }
 }
 
 impl FromIterator<Beam> for Fan {
@@ -202,8 +207,8 @@ fn placed(row: &Row, chunk: &Chunk, ranges: &Lane<i32>) -> Placed {
         placed.azimuth_rad[k] = wrapped(row.azimuth_rad + chunk.azimuth_rad[k]);
     }
     let [x, y, z] = row.axes;
-    for k in 0..LANES {
-        let range_m = f64::from(ranges[k]) * row.unit_m;
+    for (k, range) in ranges.iter().enumerate() {
+        let range_m = f64::from(*range) * row.unit_m;
         let at = |axis: usize| range_m * chunk.direction[axis][k] + chunk.origin_m[axis][k];
         let (ahead, aside, up) = (at(0), at(1), at(2));
         let along = |axis: [f64; 3]| axis[0] * ahead + axis[1] * aside + axis[2] * up;
