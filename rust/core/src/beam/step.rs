@@ -13,13 +13,12 @@ use crate::error::BeamError;
 const LARGEST_STEP: f64 = 3.0;
 /// The same where deviations are those of blades in general.
 const LARGEST_VAGUE_STEP: f64 = 0.3;
+/// The same of the surface, whose unknowns are many and each of little effect.
+const LARGEST_WAVE: f64 = 6.0;
 /// Gate at which steps are held back as a prior would, metres.
 const FREE_GATE_M: f64 = 0.025;
 /// A step that takes back so much of the last one is halved: the truth lies between both.
 const TURNED_BACK: f64 = 0.5;
-/// The same of the surface, whose unknowns are many and each of little effect.
-const LARGEST_WAVE: f64 = 6.0;
-
 /// A step may lead so far from where the slopes say it leads, as a share of the gate: loads and stiffness
 /// multiply, and what they do together no slope tells ...
 const ASTRAY: f64 = 0.1;
