@@ -10,7 +10,7 @@ use super::axis::Axis;
 use super::clocks::Clocks;
 use super::echoes::Seen;
 use super::equilibrium::Physics;
-use super::family::{self, Kind, Loading, Response, Trust, Unknown};
+use super::family::{self, Equilibrium, Kind, Loading, Response, Trust, Unknown};
 use super::layout::Layout;
 use super::mesh::Mesh;
 use super::normal::Normal;
@@ -208,15 +208,17 @@ impl Adjustment {
             None => mesh.free.clone(),
         };
         let at = physics.solve(mesh, &start)?;
-        let mut responses = family::responses(mesh, &physics, &at, &self.shared)?;
-        responses.extend(self.own_responses(hold, &physics, &at, &responses)?);
+        let equilibrium = Equilibrium::new(mesh, &physics, &at)?;
+        let shared = self.shared.iter();
+        let mut responses: Vec<_> = shared.map(|u| equilibrium.response(u)).collect();
+        responses.extend(self.own_responses(hold, &equilibrium, &responses));
         let mut sway = family::sway_responses(mesh, &at);
         if self.follows_load {
             let load = Unknown {
                 kind: Kind::Load,
                 sigma: 1.0,
             };
-            sway.insert(0, family::responses(mesh, &physics, &at, &[load])?.pop()?);
+            sway.insert(0, equilibrium.response(&load));
         }
         Some(Linear {
             sway,
@@ -230,23 +232,19 @@ impl Adjustment {
     fn own_responses(
         &self,
         hold: usize,
-        physics: &Physics,
-        at: &Axis,
+        equilibrium: &Equilibrium<'_>,
         shared: &[Response],
-    ) -> Option<Vec<Response>> {
+    ) -> Vec<Response> {
         let same = |unknown: &Unknown| {
             let is_stiffness = matches!(unknown.kind, Kind::Soft { .. });
             let place = self.shared.iter().position(|s| s.kind == unknown.kind);
             place.filter(|_| is_stiffness)
         };
-        let own = &self.own[hold];
-        let new: Vec<Unknown> = own.iter().filter(|u| same(u).is_none()).copied().collect();
-        let mut found = family::responses(&self.problem.mesh, physics, at, &new)?.into_iter();
         let respond = |unknown: &Unknown| match same(unknown) {
-            Some(place) => Some(shared[place].scaled(unknown.sigma / self.shared[place].sigma)),
-            None => found.next(),
+            Some(place) => shared[place].scaled(unknown.sigma / self.shared[place].sigma),
+            None => equilibrium.response(unknown),
         };
-        own.iter().map(respond).collect()
+        self.own[hold].iter().map(respond).collect()
     }
 
     /// Everything that bends the blade in a hold, as estimated so far.

@@ -214,39 +214,49 @@ pub struct Response {
 /// Step of the differences, standard deviations: what an unknown does to a fixed shape is nearly linear.
 const STEP: f64 = 0.02;
 
-/// Responses of an equilibrium to each of `unknowns`, per standard deviation.
-///
-/// `None` where the equilibrium is none that holds.
-pub fn responses(
-    mesh: &Mesh,
-    physics: &Physics,
-    at: &Axis,
-    unknowns: &[Unknown],
-) -> Option<Vec<Response>> {
-    let tangent = Tangent::of(mesh, physics, at)?;
-    let respond = |unknown: &Unknown| {
+/// An equilibrium that holds, and how it answers to small changes.
+#[derive(Debug, Clone)]
+pub struct Equilibrium<'a> {
+    mesh: &'a Mesh,
+    physics: &'a Physics,
+    at: &'a Axis,
+    tangent: Tangent,
+}
+
+impl<'a> Equilibrium<'a> {
+    /// At a shape that `physics` gave; `None` where it is none that holds.
+    pub fn new(mesh: &'a Mesh, physics: &'a Physics, at: &'a Axis) -> Option<Self> {
+        Some(Self {
+            mesh,
+            physics,
+            at,
+            tangent: Tangent::of(mesh, physics, at)?,
+        })
+    }
+
+    /// Response to one standard deviation of an unknown.
+    pub fn response(&self, unknown: &Unknown) -> Response {
         let root_rad = match unknown.kind {
             Kind::Root { axis } => Vector3::ith(axis, unknown.sigma),
             _ => Vector3::zeros(),
         };
         Response {
-            curvature: tangent.answer(&asked(mesh, physics, at, unknown), &root_rad),
+            curvature: self.tangent.answer(&self.asked(unknown), &root_rad),
             root_rad,
         }
-    };
-    Some(unknowns.iter().map(respond).collect())
-}
+    }
 
-/// What one standard deviation of an unknown asks of the curvatures of a fixed shape, rad/m.
-fn asked(mesh: &Mesh, physics: &Physics, at: &Axis, unknown: &Unknown) -> Vec<Vector3<f64>> {
-    let side = |step: f64| {
-        let mut physics = physics.clone();
-        add(&mut physics, mesh, unknown.kind, step * unknown.sigma);
-        physics.curvatures(mesh, at)
-    };
-    let (ahead, behind) = (side(STEP), side(-STEP));
-    let slope = |(a, b): (&Vector3<f64>, &Vector3<f64>)| (a - b) / (2.0 * STEP);
-    ahead.iter().zip(&behind).map(slope).collect()
+    /// What one standard deviation of an unknown asks of the curvatures of a fixed shape, rad/m.
+    fn asked(&self, unknown: &Unknown) -> Vec<Vector3<f64>> {
+        let side = |step: f64| {
+            let mut physics = self.physics.clone();
+            add(&mut physics, self.mesh, unknown.kind, step * unknown.sigma);
+            physics.curvatures(self.mesh, self.at)
+        };
+        let (ahead, behind) = (side(STEP), side(-STEP));
+        let slope = |(a, b): (&Vector3<f64>, &Vector3<f64>)| (a - b) / (2.0 * STEP);
+        ahead.iter().zip(&behind).map(slope).collect()
+    }
 }
 
 /// What each response moves at a shape.
@@ -346,7 +356,8 @@ mod tests {
             ],
         ]
         .concat();
-        let responses = responses(&mesh, &physics, &at, &unknowns).unwrap();
+        let equilibrium = Equilibrium::new(&mesh, &physics, &at).unwrap();
+        let responses: Vec<_> = unknowns.iter().map(|u| equilibrium.response(u)).collect();
         let fields = fields(&mesh, &at, &responses);
         for (unknown, field) in unknowns.iter().zip(&fields) {
             let side = |step: f64| {

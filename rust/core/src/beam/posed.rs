@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Vector3};
 
 use super::axis::{Axis, Field};
-use super::family::Response;
+use super::family::{self, Response};
 use super::mesh::Mesh;
 use super::shape::splines;
 use super::sight::{Instant, Section};
@@ -47,11 +47,7 @@ impl Posed {
         span_ns: (i64, i64),
         knot_ns: i64,
     ) -> Self {
-        let fields = |all: &[Response]| -> Vec<Field> {
-            all.iter()
-                .map(|r| still.field(&mesh.s_m, &r.curvature, &r.root_rad))
-                .collect()
-        };
+        let moves = |all: &[Response]| flat(mesh, &family::fields(mesh, &still, all));
         let knots = knots(span_ns, knot_ns);
         let steps = (span_ns.1 - span_ns.0) / GRID_NS + 2;
         let shape = |step: i64| {
@@ -69,8 +65,8 @@ impl Posed {
             start_ns: span_ns.0,
             knot_ns,
             shapes: (0..steps).map(shape).collect(),
-            moves: flat(mesh, &fields(responses)),
-            sway_moves: flat(mesh, &fields(sway)),
+            moves: moves(responses),
+            sway_moves: moves(sway),
             unknowns: responses.len(),
             modes: sway.len(),
             knots,

@@ -4,14 +4,13 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::axis::Axis;
 use super::equilibrium::Physics;
-use super::family::{self, Kind, Unknown};
+use super::family::{self, Equilibrium, Kind, Unknown};
 use super::mesh::Mesh;
 
 /// Relative standard deviation of a load at one saddle about the even spread.
 const SPREAD: f64 = 0.15;
 /// Relative standard deviation of a prediction.
 const PREDICTED: f64 = 0.03;
-const STEPS: usize = 12;
 
 /// Forces at the saddles, newtons along `direction`, for which the sections at `s_m` move by
 /// `deflection_m`; `None` where no load does.
@@ -64,7 +63,7 @@ fn moved(mesh: &Mesh, rest: &Axis, axis: &Axis, s_m: f64) -> Vector3<f64> {
     axis.place[node] - rest.place[node]
 }
 
-/// One force for all saddles by regula falsi, from little to enough.
+/// One force for all saddles, from little to enough.
 fn even_force(
     mesh: &Mesh,
     unloaded: &Physics,
@@ -86,7 +85,7 @@ fn even_force(
         // Deflection grows a little less than the load does.
         force *= (wanted_m / reached.max(1e-6)).clamp(0.5, 1.6);
     }
-    (STEPS > 0).then_some((axis, force))
+    Some((axis, force))
 }
 
 /// Change of the forces towards the predicted deflections, held near the even spread.
@@ -107,6 +106,7 @@ fn spread(
         matrix[(i, i)] += tight;
         right[i] += tight * (even - forces[i]);
     }
+    let equilibrium = Equilibrium::new(mesh, &physics, axis)?;
     let mut slopes = DMatrix::<f64>::zeros(sections, count);
     for saddle in 0..count {
         for axis_number in 0..3 {
@@ -118,8 +118,7 @@ fn spread(
                 kind,
                 sigma: SPREAD * even,
             };
-            let response = family::responses(mesh, &physics, axis, &[unknown])?;
-            let field = &family::fields(mesh, axis, &response)[0];
+            let field = &family::fields(mesh, axis, &[equilibrium.response(&unknown)])[0];
             for (row, s) in s_m.iter().enumerate() {
                 let way = moved(mesh, rest, axis, *s).normalize();
                 let slope = way.dot(&field.place[mesh.node_at(*s)]) / unknown.sigma;
