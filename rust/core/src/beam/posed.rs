@@ -6,7 +6,7 @@ use super::axis::{Axis, Field};
 use super::family::{self, Response};
 use super::mesh::Mesh;
 use super::shape::splines;
-use super::sight::{Instant, Section};
+use super::sight::{Contact, Instant, Section};
 use super::sums::{BOTH, MOVES};
 
 /// Time between two shapes of the blade, nanoseconds; linear in between.
@@ -83,8 +83,12 @@ impl Posed {
             before: &self.shapes[step as usize],
             after: &self.shapes[step as usize + 1],
             share: share.clamp(0.0, 1.0),
-            apart_s: GRID_NS as f64 * 1e-9,
         }
+    }
+
+    /// How fast a point of the surface moves at an instant, world, metres per second.
+    pub fn velocity_m_s(&self, contact: &Contact, time_ns: i64) -> Vector3<f64> {
+        self.at(time_ns).way_m(contact) / (GRID_NS as f64 * 1e-9)
     }
 
     /// The blade without sway.
@@ -93,7 +97,6 @@ impl Posed {
             before: &self.still,
             after: &self.still,
             share: 0.0,
-            apart_s: GRID_NS as f64 * 1e-9,
         }
     }
 

@@ -94,27 +94,28 @@ impl<'a> Rows<'a> {
     fn add_echo(&mut self, echo: &Echo, hint: Option<f64>) -> Option<f64> {
         let lidar = &self.lidars[echo.lidar];
         let direction = lidar.direction(&echo.direction);
-        let Some(hit) = self.hit(echo, lidar, &direction, hint) else {
+        let time_ns = self.time_ns(echo.lidar, echo.time_ns);
+        let Some(hit) = self.hit(&lidar.origin, &direction, time_ns, hint) else {
             self.tally.missed += 1;
             return None;
         };
-        let arc_m = Some(self.arc_m(&hit.contact));
+        let s_m = self.arc_m(&hit.contact);
         let upright = faded(hit.cosine, FLAT_COSINE);
         if echo.from_end < MIXED_ECHOES || upright == 0.0 {
             self.tally.unfit += 1;
-            return arc_m;
+            return Some(s_m);
         }
         let misread_m = self.misread_m(echo.lidar, hit.cosine);
         let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - misread_m;
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
         let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
-        let patch = self.patch(&hit.contact);
+        let patch = self.patch(&hit.contact, s_m);
         let met = Used {
             time_ns: echo.time_ns,
             lidar: echo.lidar,
             ring: echo.ring,
-            s_m: self.arc_m(&hit.contact),
+            s_m,
             residual_m: residual,
             point: lidar.origin + direction * (hit.range_m + residual),
             chord: self.chord(&hit.contact),
@@ -123,7 +124,7 @@ impl<'a> Rows<'a> {
         };
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
             self.tally.rejected.push(met);
-            return arc_m;
+            return Some(s_m);
         }
         self.tally.used.push(met);
         let alone = (hit.cosine / noise_m).powi(2);
@@ -132,8 +133,8 @@ impl<'a> Rows<'a> {
             None => 1.0 + weights.surface_m * weights.surface_m * alone,
         };
         let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
-        self.add_hit(echo, &hit, residual, upright * weight);
-        arc_m
+        self.add_hit(echo, &hit, time_ns, residual, upright * weight);
+        Some(s_m)
     }
 
     /// Instant of a shot by the clock that all lidars share, as thought so far.
@@ -143,17 +144,17 @@ impl<'a> Rows<'a> {
 
     fn hit(
         &self,
-        echo: &Echo,
-        lidar: &Lidar,
+        origin: &Vector3<f64>,
         direction: &Vector3<f64>,
+        time_ns: i64,
         hint: Option<f64>,
     ) -> Option<Hit> {
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(self.time_ns(echo.lidar, echo.time_ns));
-        let near = hint.and_then(|s_m| blade.hit(mesh, &lidar.origin, direction, s_m));
+        let blade = self.posed.at(time_ns);
+        let near = hint.and_then(|s_m| blade.hit(mesh, origin, direction, s_m));
         near.or_else(|| {
-            let s_m = blade.nearest_s_m(mesh, &lidar.origin, direction);
-            blade.hit(mesh, &lidar.origin, direction, s_m)
+            let s_m = blade.nearest_s_m(mesh, origin, direction);
+            blade.hit(mesh, origin, direction, s_m)
         })
     }
 
@@ -171,9 +172,9 @@ impl<'a> Rows<'a> {
         mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
     }
 
-    fn patch(&self, contact: &Contact) -> usize {
+    fn patch(&self, contact: &Contact, s_m: f64) -> usize {
         let is_second_side = self.adjustment.problem.mesh.is_second_side(contact.vertex);
-        common::patch(self.arc_m(contact), is_second_side, contact.x_c)
+        common::patch(s_m, is_second_side, contact.x_c)
     }
 
     /// What errors of range add to the prediction.
@@ -184,9 +185,8 @@ impl<'a> Rows<'a> {
         slopes[0] * values[first] + slopes[1] * values[first + 1]
     }
 
-    fn add_hit(&mut self, echo: &Echo, hit: &Hit, residual: f64, weight: f64) {
+    fn add_hit(&mut self, echo: &Echo, hit: &Hit, time_ns: i64, residual: f64, weight: f64) {
         let along = -hit.contact.normal / hit.cosine;
-        let time_ns = self.time_ns(echo.lidar, echo.time_ns);
         let moves = self.fill_row(&hit.contact, &along, echo.lidar, time_ns);
         let layout = &self.adjustment.layout;
         let first = layout.lidar_at(echo.lidar);
@@ -234,7 +234,7 @@ impl<'a> Rows<'a> {
                     .map(|(k, weight)| (first + k, slope * weight * self.adjustment.modes_m[mode])),
             );
         }
-        let velocity_m_s = self.posed.at(time_ns).velocity_m_s(contact);
+        let velocity_m_s = self.posed.velocity_m_s(contact, time_ns);
         let clock_s = self.adjustment.rig.clock_s[lidar];
         row.push((layout.clock_at(lidar), along.dot(&velocity_m_s) * clock_s));
         if self.adjustment.free.end > layout.lidar_at(0) {
@@ -261,26 +261,29 @@ impl<'a> Rows<'a> {
             aside: (miss - hit * hit.dot(&miss)).normalize(),
         };
         let mesh = &self.adjustment.problem.mesh;
-        let blade = self.posed.at(self.time_ns(edge.lidar, edge.time_ns));
+        let time_ns = self.time_ns(edge.lidar, edge.time_ns);
+        let blade = self.posed.at(time_ns);
         let near = blade.nearest_s_m(mesh, &plane.origin, &hit);
         let Some(silhouette) = blade.silhouette(mesh, &plane, near) else {
             self.tally.edges_left_out[1] += 1;
             return;
         };
-        if firmness(&silhouette) == 0.0 {
-            self.tally.edges_left_out[0] += 1;
-            return;
-        }
-        self.add_silhouette(edge, &plane, &silhouette, step_rad);
+        self.add_silhouette(edge, time_ns, &plane, &silhouette, step_rad);
     }
 
     fn add_silhouette(
         &mut self,
         edge: &Edge,
+        time_ns: i64,
         plane: &ScanPlane,
         silhouette: &Silhouette,
         step_rad: f64,
     ) {
+        let firm = firmness(silhouette);
+        if firm == 0.0 {
+            self.tally.edges_left_out[0] += 1;
+            return;
+        }
         let layout = &self.adjustment.layout;
         let side = side_of(silhouette.contact.x_c);
         let at = layout.edge_offset_at(self.hold, edge.lidar, side);
@@ -315,16 +318,10 @@ impl<'a> Rows<'a> {
         let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
         let edge_at = layout.edge_at();
         let along = across(plane, silhouette);
-        let time_ns = self.time_ns(edge.lidar, edge.time_ns);
         let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
         self.entries
             .extend([(edge_at, EDGE_RAD), (at, EDGE_OFFSET_RAD)]);
-        self.add_row(
-            &silhouette.contact,
-            moves,
-            residual,
-            firmness(silhouette) * weight,
-        );
+        self.add_row(&silhouette.contact, moves, residual, firm * weight);
     }
 }
 

@@ -20,8 +20,6 @@ pub struct Instant<'a> {
     pub after: &'a Axis,
     /// Share of the way between both.
     pub share: f64,
-    /// Time between both, seconds.
-    pub apart_s: f64,
 }
 
 /// A section at one instant.
@@ -85,13 +83,13 @@ impl Instant<'_> {
         }
     }
 
-    /// How fast a point of the surface moves, world, metres per second.
-    pub fn velocity_m_s(&self, contact: &Contact) -> Vector3<f64> {
+    /// Way of a point of the surface from one state to the other, world, metres.
+    pub fn way_m(&self, contact: &Contact) -> Vector3<f64> {
         let (section, local) = (&contact.section, &contact.local);
         let at = |axis: &Axis, node: usize| axis.place[node] + axis.turn[node] * local;
         let moved = |node: usize| at(self.after, node) - at(self.before, node);
         let (inner, outer) = (moved(section.node), moved(section.node + 1));
-        (inner + (outer - inner) * section.share) / self.apart_s
+        inner + (outer - inner) * section.share
     }
 
     fn turn(&self, node: usize) -> Matrix3<f64> {
