@@ -64,6 +64,7 @@ pub struct SweepCutter {
     lidar: usize,
     turns: Turns,
     visible_rad: f64,
+    every: u32,
     open: Option<Open>,
     spare: Vec<PointCloud<Sensor>>,
     usual: usize, // echoes of the last sweep: as much room is made for the next
@@ -83,11 +84,13 @@ struct Open {
 
 impl SweepCutter {
     /// Cuts at encoder azimuth `cut_rad`; `visible_rad` is the angle of the turn that the sensor sends.
-    pub fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self {
+    /// Turns come out whose number is a multiple of `every`.
+    pub fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self {
         Self {
             lidar,
             turns: Turns::new(cut_rad),
             visible_rad: visible_rad.clamp(1e-3, TAU),
+            every: every.max(1),
             open: None,
             spare: Vec::new(),
             usual: 0,
@@ -99,14 +102,17 @@ impl SweepCutter {
         self.lidar
     }
 
-    /// Whether a packet may have returns of a turn whose number is a multiple of `every`.
-    pub fn is_in_turn(&self, packet: &Placed, every: u32) -> bool {
+    /// Whether a packet may have returns of a turn that comes out.
+    pub fn is_in_turn(&self, packet: &Placed) -> bool {
+        if self.every == 1 {
+            return true;
+        }
         let start_rad = self.turns.place(packet);
         let end_rad = start_rad + packet.head.turned_rad.max(0.0);
         // Jitter of the encoder may begin a packet before the turn that it is added to.
         let open = self.open.as_ref().map_or(0, |open| open.turn);
         let last = Turns::turn_of(end_rad).max(open);
-        (Turns::turn_of(start_rad)..=last).any(|turn| turn.is_multiple_of(every))
+        (Turns::turn_of(start_rad)..=last).any(|turn| turn.is_multiple_of(self.every))
     }
 
     /// Follows the rotor over a packet whose returns are not wanted.
@@ -195,6 +201,9 @@ impl SweepCutter {
 
     fn close(&mut self, end: Timestamp, out: &mut VecDeque<Sweep>) {
         let Some(open) = self.open.take() else { return };
+        if !open.turn.is_multiple_of(self.every) {
+            return self.recycle(open.cloud);
+        }
         self.usual = open.cloud.len();
         out.push_back(Sweep {
             lidar: self.lidar,

@@ -47,7 +47,7 @@ impl Reader<PointTagger> {
 impl Sink for PointTagger {
     type Out = PointBlock;
 
-    fn new(lidar: usize, cut_rad: f64, _visible_rad: f64) -> Self {
+    fn new(lidar: usize, cut_rad: f64, _visible_rad: f64, _every: u32) -> Self {
         Self {
             lidar: lidar as u16,
             turns: Turns::new(cut_rad),

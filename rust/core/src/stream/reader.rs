@@ -27,8 +27,8 @@ pub struct SweepOptions {
     pub cut_azimuth_rad: Vec<f64>,
     /// Bearings in the sensor frame, by number of the lidar: returns outside may be left out, for speed.
     pub bearings: Vec<Option<Arc>>,
-    /// One turn in so many is wanted, by number of the lidar: returns of others may be left out, for speed. Those whose
-    /// number is a multiple of it have all of theirs.
+    /// One turn in so many is wanted, by number of the lidar, and 1 where there is none: sweeps come of those whose
+    /// number is a multiple of it, and what others alone hold is not decoded.
     pub every: Vec<u32>,
     /// Packets before this are left out.
     pub start: Option<Timestamp>,
@@ -69,11 +69,12 @@ pub trait Sink {
     /// Where all lidars' results are gathered.
     type Out: Default;
 
-    /// For the lidar with this number; `visible_rad` is the angle of the turn that it sends.
-    fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self;
+    /// For the lidar with this number; `visible_rad` is the angle of the turn that it sends, and of
+    /// its turns one in `every` is wanted.
+    fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self;
 
-    /// Whether a packet may have returns of a turn whose number is a multiple of `every`.
-    fn is_in_turn(&self, _packet: &Placed, _every: u32) -> bool {
+    /// Whether a packet may have returns of a turn that is wanted.
+    fn is_in_turn(&self, _packet: &Placed) -> bool {
         true
     }
 
@@ -116,7 +117,6 @@ struct Lane<S> {
     clock: ClockModel,
     view: FieldOfView,
     bearings: Option<Arc>,
-    every: u32,
     sink: S,
     spare: Vec<Vec<u8>>,
     /// A packet whose last firing may go on in the next one.
@@ -218,6 +218,7 @@ impl<S: Sink> Lane<S> {
     fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, UnitError> {
         let cut_rad = options.cut_azimuth_rad.get(number).copied().unwrap_or(0.0);
         let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
+        let every = options.every.get(number).copied().unwrap_or(1);
         Ok(Self {
             key: info.key,
             number,
@@ -228,8 +229,7 @@ impl<S: Sink> Lane<S> {
             clock: info.clock.clone(),
             view: info.view.clone(),
             bearings: options.bearings.get(number).copied().flatten(),
-            every: options.every.get(number).copied().unwrap_or(1).max(1),
-            sink: S::new(number, cut_rad, visible_rad),
+            sink: S::new(number, cut_rad, visible_rad, every),
             spare: Vec::new(),
             held: None,
             is_done: false,
@@ -327,8 +327,7 @@ impl<S: Sink> Lane<S> {
 
     fn is_wanted(&self, payload: &[u8], placed: &Placed) -> bool {
         let meets = |bearings: Arc| self.decoder.may_meet(payload, bearings);
-        let is_in_turn = self.every == 1 || self.sink.is_in_turn(placed, self.every);
-        is_in_turn && self.bearings.is_none_or(meets)
+        self.sink.is_in_turn(placed) && self.bearings.is_none_or(meets)
     }
 
     fn finish(&mut self, step: &mut Step<'_, S::Out>) {
@@ -364,12 +363,12 @@ impl Reader<SweepCutter> {
 impl Sink for SweepCutter {
     type Out = VecDeque<Sweep>;
 
-    fn new(lidar: usize, cut_rad: f64, visible_rad: f64) -> Self {
-        SweepCutter::new(lidar, cut_rad, visible_rad)
+    fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self {
+        SweepCutter::new(lidar, cut_rad, visible_rad, every)
     }
 
-    fn is_in_turn(&self, packet: &Placed, every: u32) -> bool {
-        SweepCutter::is_in_turn(self, packet, every)
+    fn is_in_turn(&self, packet: &Placed) -> bool {
+        SweepCutter::is_in_turn(self, packet)
     }
 
     fn skip(&mut self, packet: &Placed) {

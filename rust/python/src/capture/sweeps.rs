@@ -100,7 +100,6 @@ pub struct SweepIterator {
     feed: Feed,
     reader: SweepReader,
     names: Vec<String>,
-    every: Vec<u32>,
     progress: Option<Py<PyAny>>,
     is_finished: bool,
 }
@@ -128,7 +127,7 @@ impl SweepIterator {
         let options = SweepOptions {
             lidars: Some(lidars),
             cut_azimuth_rad: cut_rad,
-            every: every.clone(),
+            every,
             start: start_ns.map(Timestamp),
             stop: stop_ns.map(Timestamp),
             ..SweepOptions::default()
@@ -137,7 +136,6 @@ impl SweepIterator {
             feed: Feed::open(py, &scan.paths)?,
             reader: SweepReader::new(&scan.report, &options)?,
             names,
-            every,
             progress,
             is_finished: false,
         })
@@ -150,11 +148,6 @@ impl SweepIterator {
     fn __next__(&mut self, py: Python<'_>) -> BorderResult<Option<Sweep>> {
         loop {
             if let Some(sweep) = self.reader.pop() {
-                let every = self.every.get(sweep.lidar).copied().unwrap_or(1).max(1);
-                if !sweep.index.is_multiple_of(every) {
-                    self.reader.recycle(sweep.lidar, sweep.cloud);
-                    continue;
-                }
                 let name = self.names.get(sweep.lidar).cloned().unwrap_or_default();
                 return Ok(Some(Sweep::new(py, name, sweep)?));
             }
