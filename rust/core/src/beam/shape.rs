@@ -50,7 +50,7 @@ const NEAR_EDGE: f64 = 0.04;
 /// Chord from which on waves have their full height, metres.
 const FULL_WAVES_M: f64 = 1.0;
 /// Distance between the knots of the waves, metres.
-const KNOT_M: f64 = 2.0;
+const KNOT_M: f64 = 1.0;
 
 /// Unknowns of the surface, in standard deviations.
 #[derive(Debug, Clone)]
