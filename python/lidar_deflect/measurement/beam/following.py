@@ -30,8 +30,8 @@ STRETCH_NS = 800_000_000
 """Time that is followed at once ..."""
 LOAD_SHARE = 0.15
 """Less of it where the load changes by more: what the holds tell is taken between their loads."""
-OVERLAP_NS = 250_000_000
-"""... and what of its neighbours helps it."""
+OVERLAPS_NS = (250_000_000, 200_000_000, 150_000_000, 100_000_000, 50_000_000)
+"""... and what of its neighbours helps it: less of that, too, where the load changes by more."""
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
 FITTING = 0.8
 """A stretch of which fewer echoes than this share lie on the blade was not found."""
@@ -98,7 +98,8 @@ def follow(
     listener = inputs.listener("measure")
     loads = expected.at(times_ns)
     stretches = _stretches(times_ns, in_hold, loads)
-    spans = [_span(times_ns, inside) for inside in stretches]
+    ends_ns = [(int(times_ns[inside[0]]), int(times_ns[inside[-1]])) for inside in stretches]
+    spans = [_span(expected, *ends) for ends in ends_ns]
     telling = clocks.telling([loads[inside] for inside in stretches], swings=expected.swings)
     offsets = _clocks(inputs, expected, solved, [spans[place] for place in telling])
     feed = reading(inputs, solved.plan, spans)
@@ -151,8 +152,17 @@ def _stretches(
     return np.split(between, breaks[1:])
 
 
-def _span(times_ns: Times, inside: NDArray[np.intp]) -> tuple[int, int]:
-    return int(times_ns[inside[0]]) - OVERLAP_NS, int(times_ns[inside[-1]]) + OVERLAP_NS
+def _span(expected: Expected, first_ns: int, last_ns: int) -> tuple[int, int]:
+    return first_ns - _overlap_ns(expected, first_ns, -1), last_ns + _overlap_ns(
+        expected, last_ns, 1
+    )
+
+
+def _overlap_ns(expected: Expected, end_ns: int, side: int) -> int:
+    """How much of a neighbour has nearly the load of the end of a stretch."""
+    shares = expected.at([end_ns, *(end_ns + side * apart_ns for apart_ns in OVERLAPS_NS)])
+    is_alike = np.abs(shares[1:] - shares[0]) <= LOAD_SHARE
+    return OVERLAPS_NS[int(np.argmax(is_alike)) if is_alike.any() else -1]
 
 
 def _between(
