@@ -154,6 +154,7 @@ fn started(mesh: &Mesh, poses: &[WorldFromSensor], seen: &[Arc<Seen>]) -> Adjust
         edge_rad: 1e-4,
         echoes: 20_000,
         common: Vec::new(),
+        learned: 0,
     };
     Adjustment::new(problem, rig, weights).unwrap()
 }

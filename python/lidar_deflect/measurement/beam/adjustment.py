@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -194,28 +192,15 @@ def _settle(
     told: dict[str, Any] = {"largest": np.inf}
     while stage < stages or (told["largest"] > SETTLED and stage < last):
         told = native.step(*schedule.at(stage))
-        with suppress(MeasurementError):  # a step too far is brought back by the next ones
-            native.linearise()
         steps, tries = steps + 1, tries + 1
         is_late = stage >= stages or tries >= PATIENCE
-        if is_late or schedule.is_near(stage, told["moved_m"], partial(_fit, native)):
+        if is_late or schedule.is_near(stage, told["moved_m"]):
             stage, tries = stage + 1, 0
         if listener:
             listener(stage, last)
     if listener:
         listener(last, last)
     return told | {"holds": [by_lidar(hold, inputs) for hold in native.told()]}, steps
-
-
-def _fit(native: _native.BeamAdjustment, gate_m: float) -> float:
-    """Share of the echoes of the worst hold, those that miss the blade included, within a gate."""
-
-    def of(hold: Mapping[str, Any]) -> float:
-        met = [hold["residual_m"], hold["rejected"]["residual_m"]]
-        sizes = np.abs(np.concatenate(met))
-        return float((sizes < gate_m).sum() / max(len(sizes) + hold["missed"], 1))
-
-    return min(of(hold) for hold in native.told())
 
 
 def by_lidar(told: Mapping[str, Any], inputs: Inputs) -> Mapping[str, Any]:

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Step = tuple[float, float, str]
 """Gates of echoes along and of edges across the ray, metres, and what may change."""
@@ -15,12 +11,8 @@ LAST = (0.05, 0.05)
 """Gates of the last steps, in which everything may change."""
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
-
-
 NEAR = 0.3
 """A blade that still moves by more than this share of the next gate is not yet within it ..."""
-FITTING = 0.85
-"""... and while loads alone are free so many of its echoes have to lie within that gate ..."""
 PATIENCE = 8
 """... and so many steps are taken before the gate closes all the same."""
 
@@ -44,14 +36,9 @@ class Schedule:
         """Return what a step is taken with; `stage` counts from 0."""
         return self.first[stage] if stage < len(self.first) else (*LAST, "all")
 
-    def is_near(self, stage: int, moved_m: float, fit: Callable[[float], float]) -> bool:
-        """Whether a blade that moved so far in a step can go on to the next stage.
-
-        `fit` gives the share of the echoes of the worst hold that lie within a gate in metres.
-        """
-        gate_m = self.at(stage + 1)[0]
-        is_sought = self.at(stage)[2] == "loads"
-        return moved_m < NEAR * gate_m and (not is_sought or fit(gate_m) > FITTING)
+    def is_near(self, stage: int, moved_m: float) -> bool:
+        """Whether a blade that moved so far in a step can go on to the next stage."""
+        return moved_m < NEAR * self.at(stage + 1)[0]
 
 
 def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:

@@ -103,6 +103,14 @@ struct Linear {
     sway: Vec<Response>,
 }
 
+/// Where an adjustment stood.
+#[derive(Debug, Clone)]
+pub(super) struct Spot {
+    values: DVector<f64>,
+    rig: DVector<f64>,
+    linear: Vec<Linear>,
+}
+
 /// The unknowns as estimated so far.
 #[derive(Debug, Clone)]
 pub struct Adjustment {
@@ -283,6 +291,7 @@ impl Adjustment {
             weights: Weights {
                 noise_m: self.weights.noise_m.clone(),
                 common: Vec::new(),
+                learned: 0,
                 ..self.weights
             },
             problem,
@@ -308,6 +317,23 @@ impl Adjustment {
             self.values[unknown] += change;
             self.build();
         }
+    }
+
+    /// Where the adjustment stands, to come back to.
+    pub(super) fn spot(&self) -> Spot {
+        Spot {
+            values: self.values.clone(),
+            rig: self.rig.values.clone(),
+            linear: self.linear.clone(),
+        }
+    }
+
+    /// Comes back to where the adjustment stood.
+    pub(super) fn return_to(&mut self, spot: Spot) {
+        self.values = spot.values;
+        self.rig.values = spot.rig;
+        self.linear = spot.linear;
+        self.build();
     }
 
     /// Brings the surface to its unknowns.
@@ -411,6 +437,11 @@ impl Gates {
     /// Whether residuals within them tell of the data, not of a blade that is elsewhere.
     pub fn is_fine(&self) -> bool {
         self.echo_m <= FINE_M
+    }
+
+    /// Whether the blade is still being found.
+    pub fn is_search(&self) -> bool {
+        self.stage < Stage::All
     }
 
     /// Standard deviation below which no echo and no edge is taken to be, metres.

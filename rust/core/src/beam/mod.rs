@@ -20,6 +20,7 @@ pub mod family;
 pub mod gather;
 pub mod layout;
 pub mod mesh;
+pub mod near;
 pub mod normal;
 pub mod outline;
 pub mod panel;
@@ -30,6 +31,7 @@ pub mod rows;
 #[cfg(test)]
 mod sample;
 pub mod sections;
+pub mod seek;
 pub mod shape;
 pub mod sight;
 pub mod silhouette;

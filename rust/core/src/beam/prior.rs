@@ -108,6 +108,18 @@ impl Adjustment {
         prior
     }
 
+    /// How far the unknowns are from what was known before, as a weighted sum of squares.
+    pub(super) fn surprise(&self, stage: Stage) -> f64 {
+        let of = |i: usize| self.tightness_of(i) * (self.expected[i] - self.values[i]).powi(2);
+        let rig = self.layout.lidar_at(0)..self.layout.shape_at();
+        let own: f64 = self.free.clone().filter(|i| !rig.contains(i)).map(of).sum();
+        if !self.free.contains(&rig.start) {
+            return own;
+        }
+        let off = &self.rig.prior - &self.rig.values;
+        own + off.dot(&(self.rig_information(stage) * &off))
+    }
+
     /// What is known of the lidars; while the blade is being found their ranges are held as well, or a beam
     /// that meets a saddle takes its offset for its own.
     fn rig_information(&self, stage: Stage) -> DMatrix<f64> {

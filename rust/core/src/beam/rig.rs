@@ -134,6 +134,12 @@ impl Lidar {
         (true_m - offset) / (1.0 + self.scale)
     }
 
+    /// The range, for what the sensor reports, metres.
+    pub fn true_m(&self, reported_m: f64, ring: usize) -> f64 {
+        let offset = self.channels.get(ring).copied().unwrap_or(0.0);
+        reported_m * (1.0 + self.scale) + offset
+    }
+
     /// How a lidar's unknowns move `along . displacement` of a contact against its rays; from `first`.
     pub fn slopes(
         &self,

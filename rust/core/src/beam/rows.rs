@@ -11,10 +11,10 @@ use super::rig::Lidar;
 use super::sight::{Contact, Hit};
 use super::silhouette::{ScanPlane, Silhouette};
 use super::sums::{BOTH, Part, Row, Sums};
-use super::weights::{EdgeMet, Tally, Used, faded, robust};
+use super::weights::{EdgeMet, Tally, Used, cost, faded, robust};
 
 /// Echoes nearer to the end of their run than this are mixed with what lies behind.
-const MIXED_ECHOES: u32 = 2;
+pub(super) const MIXED_ECHOES: u32 = 2;
 /// Rays that meet the surface at a flatter angle count less, and from the second one on not at all,
 /// cosine of incidence: an echo that comes and goes with the estimate would never let it settle.
 const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
@@ -23,14 +23,14 @@ const SOFT_M: (f64, f64) = (0.008, 0.016);
 
 /// Makes the rows of one hold.
 pub struct Rows<'a> {
-    adjustment: &'a Adjustment,
-    lidars: &'a [Lidar],
-    gates: &'a Gates,
-    hold: usize,
-    posed: Posed,
+    pub(super) adjustment: &'a Adjustment,
+    pub(super) lidars: &'a [Lidar],
+    pub(super) gates: &'a Gates,
+    pub(super) hold: usize,
+    pub(super) posed: Posed,
     sums: Sums,
     entries: Vec<(usize, f64)>,
-    tally: Tally,
+    pub(super) tally: Tally,
 }
 
 impl<'a> Rows<'a> {
@@ -59,11 +59,13 @@ impl<'a> Rows<'a> {
 
     /// All rows, and what became of the data.
     pub fn collect(mut self) -> (Part, Tally) {
+        if self.gates.is_search() {
+            return self.collect_near();
+        }
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let most = self.adjustment.weights.echoes;
-        let stride = seen.echoes.len().div_ceil(most).max(1);
+        let stride = seen.echoes.len().div_ceil(self.adjustment.weights.echoes);
         let mut hint = None;
-        for echo in seen.echoes.iter().step_by(stride) {
+        for echo in seen.echoes.iter().step_by(stride.max(1)) {
             hint = self.add_echo(echo, hint);
         }
         for edge in &seen.edges {
@@ -80,7 +82,7 @@ impl<'a> Rows<'a> {
         self.finish().0
     }
 
-    fn finish(self) -> (Part, Tally) {
+    pub(super) fn finish(self) -> (Part, Tally) {
         let free = &self.adjustment.free;
         let state = self.adjustment.state_at(self.hold).into_iter().enumerate();
         let (places, unknowns): (Vec<_>, Vec<_>) = state.filter(|(_, i)| free.contains(i)).unzip();
@@ -110,18 +112,8 @@ impl<'a> Rows<'a> {
         let weights = &self.adjustment.weights;
         let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
         let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
-        let patch = self.patch(&hit.contact, s_m);
-        let met = Used {
-            time_ns: echo.time_ns,
-            lidar: echo.lidar,
-            ring: echo.ring,
-            s_m,
-            residual_m: residual,
-            point: lidar.origin + direction * (hit.range_m + residual),
-            chord: self.chord(&hit.contact),
-            cosine: hit.cosine,
-            patch,
-        };
+        let point = lidar.origin + direction * (hit.range_m + residual);
+        let met = self.met(echo, &hit.contact, residual, point, hit.cosine);
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
             self.tally.rejected.push(met);
             return Some(s_m);
@@ -129,7 +121,7 @@ impl<'a> Rows<'a> {
         self.tally.used.push(met);
         let alone = (hit.cosine / noise_m).powi(2);
         let factor = match weights.common.get(self.hold) {
-            Some(common) => common.echo_factor(patch, weights.surface_m, alone),
+            Some(common) => common.echo_factor(met.patch, weights.surface_m, alone),
             None => 1.0 + weights.surface_m * weights.surface_m * alone,
         };
         let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
@@ -137,8 +129,31 @@ impl<'a> Rows<'a> {
         Some(s_m)
     }
 
+    /// An echo as it met the model at a contact.
+    pub(super) fn met(
+        &self,
+        echo: &Echo,
+        contact: &Contact,
+        residual_m: f64,
+        point: Vector3<f64>,
+        cosine: f64,
+    ) -> Used {
+        let s_m = self.arc_m(contact);
+        Used {
+            time_ns: echo.time_ns,
+            lidar: echo.lidar,
+            ring: echo.ring,
+            s_m,
+            residual_m,
+            point,
+            chord: self.chord(contact),
+            cosine,
+            patch: self.patch(contact, s_m),
+        }
+    }
+
     /// Instant of a shot by the clock that all lidars share, as thought so far.
-    fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
+    pub(super) fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
         stamp_ns + (self.adjustment.clock_s(lidar) * 1e9).round() as i64
     }
 
@@ -201,7 +216,13 @@ impl<'a> Rows<'a> {
         self.add_row(&hit.contact, moves, residual, weight);
     }
 
-    fn add_row(&mut self, contact: &Contact, moves: [f64; BOTH], residual: f64, weight: f64) {
+    pub(super) fn add_row(
+        &mut self,
+        contact: &Contact,
+        moves: [f64; BOTH],
+        residual: f64,
+        weight: f64,
+    ) {
         self.sums.add(&Row {
             node: contact.section.node,
             moves,
@@ -213,7 +234,7 @@ impl<'a> Rows<'a> {
 
     /// How the nodes, and all unknowns but the state's and range errors, move `along . displacement` of
     /// a contact against the lidar: the latter in `entries`.
-    fn fill_row(
+    pub(super) fn fill_row(
         &mut self,
         contact: &Contact,
         along: &Vector3<f64>,
@@ -250,7 +271,7 @@ impl<'a> Rows<'a> {
         node_slopes(&contact.section, along, &about)
     }
 
-    fn add_edge(&mut self, edge: &Edge) {
+    pub(super) fn add_edge(&mut self, edge: &Edge) {
         let lidar = &self.lidars[edge.lidar];
         let hit = lidar.direction(&edge.hit);
         let miss = lidar.direction(&edge.miss);
@@ -279,7 +300,7 @@ impl<'a> Rows<'a> {
         silhouette: &Silhouette,
         step_rad: f64,
     ) {
-        let firm = firmness(silhouette);
+        let firm = firmness(silhouette, self.gates);
         if firm == 0.0 {
             self.tally.edges_left_out[0] += 1;
             return;
@@ -304,6 +325,8 @@ impl<'a> Rows<'a> {
             .unwrap_or(step_rad * step_rad / 12.0);
         let gate_rad = (self.gates.edge_m / silhouette.range_m).max(4.0 * sigma);
         let depth_m = (edge.range_m - silhouette.range_m).abs();
+        let variance = sigma_rad * sigma_rad + grid;
+        self.tally.cost += cost(residual, sigma, gate_rad, variance);
         if residual.abs() > gate_rad || depth_m > self.gates.echo_m.max(0.5) {
             self.tally.edges_left_out[2] += 1;
             return;
@@ -315,7 +338,7 @@ impl<'a> Rows<'a> {
             residual_rad: residual,
             step_rad,
         });
-        let weight = robust(residual, sigma, gate_rad) / (sigma_rad * sigma_rad + grid);
+        let weight = robust(residual, sigma, gate_rad) / variance;
         let edge_at = layout.edge_at();
         let along = across(plane, silhouette);
         let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
@@ -340,8 +363,12 @@ fn range_slopes_m(cosine: f64) -> [f64; 2] {
 }
 
 /// Share of its weight that an edge keeps: less where the surface turns away slowly or is seen edge-on.
-fn firmness(silhouette: &Silhouette) -> f64 {
-    faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE)
+fn firmness(silhouette: &Silhouette, gates: &Gates) -> f64 {
+    if !gates.is_search() {
+        return faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE);
+    }
+    let coarse_m = gates.coarse_m()[1];
+    faded(silhouette.soft_m, (coarse_m, 2.0 * coarse_m))
 }
 
 /// 0 at the leading edge, 1 at the trailing edge.

@@ -93,6 +93,7 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
         edge_rad: 1e-4,
         echoes: 100_000,
         common: Vec::new(),
+        learned: 0,
     };
     let mut adjustment = Adjustment::new(problem, rig.unwrap(), weights).unwrap();
     adjustment.problem.holds[0].seen = Arc::new(look(&adjustment, shift_m));

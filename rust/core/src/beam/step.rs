@@ -37,12 +37,19 @@ pub struct Step {
 }
 
 impl Adjustment {
-    /// One step of Gauss and Newton with data inside of the gates, no longer than slopes are good for.
+    /// One step of Gauss and Newton with data inside of the gates, no longer than it does good, and the
+    /// equilibria where it leads.
     ///
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
-        self.take(gates, ASTRAY * gates.echo_m)
+        if gates.is_search() {
+            return self.seek(gates);
+        }
+        let step = self.take(gates, ASTRAY * gates.echo_m)?;
+        // Without equilibria the slopes stay, and the next step comes back.
+        let _ = self.linearise();
+        Ok(step)
     }
 
     /// The same where the slopes are the model: a stretch never solves its equilibrium anew.
@@ -54,28 +61,9 @@ impl Adjustment {
     }
 
     fn take(&mut self, gates: &Gates, astray_m: f64) -> Result<Step, BeamError> {
-        let (mut normal, tallies) = self.normal(gates);
-        self.damp(&mut normal, gates);
-        let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
-        let mut step = DVector::zeros(self.layout.len());
-        step.rows_mut(self.free.start, self.free.len())
-            .copy_from(&part);
-        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
-        let largest = step.rows(0, self.layout.sway_at(0)).amax();
-        let swollen = step.rows(self.layout.shape_at(), self.layout.shape).amax();
-        let excess = (largest / self.largest_step(gates.stage)).max(swollen / LARGEST_WAVE);
-        if excess > 1.0 {
-            step /= excess;
-        }
-        if self.is_vague() {
-            self.settle(&mut step);
-        }
+        let (mut step, largest, tallies) = self.wanted(gates)?;
         let moved_m = self.go(&mut step, astray_m);
-        self.rig.values += step.rows(rig, count);
-        self.values.rows_mut(rig, count).fill(0.0);
-        if self.free.contains(&self.layout.shape_at()) {
-            self.build();
-        }
+        self.settle_in(&step);
         if gates.is_fine() {
             self.weights.learn(&tallies);
         }
@@ -86,10 +74,55 @@ impl Adjustment {
         })
     }
 
+    /// What the data ask for, no longer than slopes can be good for; its largest change of an unknown of the
+    /// blade before it was cut, and what became of the data.
+    pub(super) fn wanted(
+        &mut self,
+        gates: &Gates,
+    ) -> Result<(DVector<f64>, f64, Vec<Tally>), BeamError> {
+        let (mut normal, tallies) = self.normal(gates);
+        self.damp(&mut normal, gates);
+        let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
+        let mut step = DVector::zeros(self.layout.len());
+        step.rows_mut(self.free.start, self.free.len())
+            .copy_from(&part);
+        let largest = step.rows(0, self.layout.sway_at(0)).amax();
+        let swollen = step.rows(self.layout.shape_at(), self.layout.shape).amax();
+        let excess = (largest / self.largest_step(gates.stage)).max(swollen / LARGEST_WAVE);
+        if excess > 1.0 {
+            step /= excess;
+        }
+        if self.is_vague() || gates.is_fine() {
+            self.settle(&mut step);
+        }
+        Ok((step, largest, tallies))
+    }
+
+    /// Gives the lidars their part of a step that was gone, and the surface its shape.
+    pub(super) fn settle_in(&mut self, step: &DVector<f64>) {
+        let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
+        self.rig.values += step.rows(rig, count);
+        self.values.rows_mut(rig, count).fill(0.0);
+        if self.free.contains(&self.layout.shape_at()) {
+            self.build();
+        }
+    }
+
+    /// The axes of all holds without sway.
+    pub(super) fn axes(&self) -> Vec<Axis> {
+        let holds = 0..self.problem.holds.len();
+        holds.map(|hold| self.still(hold)).collect()
+    }
+
+    /// Largest move of the axis in any hold since it was at `from`, metres.
+    pub(super) fn moved_m(&self, from: &[Axis]) -> f64 {
+        let moved = |(hold, from): (usize, &Axis)| from.farthest_m(&self.still(hold));
+        from.iter().enumerate().map(moved).fold(0.0, f64::max)
+    }
+
     /// Goes a step, or as much of it as leads where the slopes say it leads; how far the axis moves.
     fn go(&mut self, step: &mut DVector<f64>, astray_m: f64) -> f64 {
-        let holds = 0..self.problem.holds.len();
-        let from: Vec<Axis> = holds.map(|hold| self.still(hold)).collect();
+        let from = self.axes();
         let start = self.values.clone();
         let tries = if astray_m.is_finite() { SHORTENED } else { 0 };
         for _ in 0..tries {
@@ -102,8 +135,7 @@ impl Adjustment {
             *step *= (astray_m / far_m).sqrt().clamp(0.2, 0.9);
         }
         self.values = start + &*step;
-        let moved = |(hold, from): (usize, &Axis)| from.farthest_m(&self.still(hold));
-        from.iter().enumerate().map(moved).fold(0.0, f64::max)
+        self.moved_m(&from)
     }
 
     /// How far the equilibria lie from where the slopes have them, metres; infinite without one.

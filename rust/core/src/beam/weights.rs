@@ -7,6 +7,9 @@ use super::common::{self, Common};
 /// Residuals beyond so many standard deviations count less.
 const ROBUST: f64 = 3.0;
 
+/// So often weights are taken from residuals.
+const LEARNED: usize = 4;
+
 /// How data are weighted.
 #[derive(Debug, Clone)]
 pub struct Weights {
@@ -21,11 +24,15 @@ pub struct Weights {
     pub echoes: usize,
     /// What the data of each hold have in common; empty before the first look at residuals.
     pub common: Vec<Common>,
+    /// How often they were taken from residuals.
+    pub learned: usize,
 }
 
 /// What became of the data of a hold.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
+    /// What all of them cost, those beyond the gate as much as those at it; while the blade is being found.
+    pub cost: f64,
     /// Echoes that counted.
     pub used: Vec<Used>,
     /// Edges that counted.
@@ -80,8 +87,13 @@ pub struct EdgeMet {
 
 impl Weights {
     /// Takes from the residuals about a blade that is found the noise of each lidar and what neighbouring
-    /// data have in common: before, they have in common that it is elsewhere.
+    /// data have in common: before, they have in common that it is elsewhere. After a few times they stay,
+    /// or what they weigh would never come to rest.
     pub fn learn(&mut self, tallies: &[Tally]) {
+        if self.learned == LEARNED {
+            return;
+        }
+        self.learned += 1;
         self.learn_noise(tallies);
         self.surface_m = common::surface_m(tallies, &self.noise_m, self.surface_m);
         let of = |tally| Common::of(tally, &self.noise_m);
@@ -120,6 +132,15 @@ pub(super) fn faded(value: f64, (whole, none): (f64, f64)) -> f64 {
 
 /// Weight of a residual: it fades beyond a few standard deviations, later while the gate is wide.
 pub(super) fn robust(residual: f64, sigma: f64, gate: f64) -> f64 {
-    let width = (ROBUST * sigma).max(0.3 * gate);
-    1.0 / (1.0 + (residual / width).powi(2))
+    1.0 / (1.0 + (residual / width(sigma, gate)).powi(2))
+}
+
+/// What a residual costs whose weight is that of [`robust`] over `variance`; beyond the gate no more.
+pub(super) fn cost(residual: f64, sigma: f64, gate: f64, variance: f64) -> f64 {
+    let width = width(sigma, gate);
+    width * width / variance * (residual.abs().min(gate) / width).powi(2).ln_1p()
+}
+
+fn width(sigma: f64, gate: f64) -> f64 {
+    (ROBUST * sigma).max(0.3 * gate)
 }

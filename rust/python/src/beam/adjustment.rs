@@ -148,6 +148,7 @@ impl BeamAdjustment {
             edge_rad,
             echoes,
             common: Vec::new(),
+            learned: 0,
         };
         let rig = Rig::new(
             poses?,
@@ -167,13 +168,6 @@ impl BeamAdjustment {
             tallies: Vec::new(),
             threads,
         })
-    }
-
-    /// Solves the equilibria of all holds anew.
-    fn linearise(&mut self, py: Python<'_>) -> BorderResult<()> {
-        self.solution = None;
-        let core = &mut self.core;
-        Ok(compute(py, self.threads, || core.linearise())??)
     }
 
     /// One step with data inside of the gates.

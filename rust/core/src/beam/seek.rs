@@ -1,0 +1,157 @@
+//! How the blade is found, from metres away: by distances of points, in steps that have to do good.
+
+use nalgebra::DVector;
+
+use super::adjust::{Adjustment, Gates};
+use super::echoes::Echo;
+use super::near::Near;
+use super::rows::{MIXED_ECHOES, Rows};
+use super::step::Step;
+use super::sums::Part;
+use super::weights::{Tally, cost, robust};
+use crate::error::BeamError;
+
+/// So many echoes of a hold suffice, and so many edges.
+const ENOUGH: usize = 2000;
+/// A step that does no good is shortened to this share, at most so often.
+const SHORTENED: (f64, usize) = (0.4, 6);
+
+impl Adjustment {
+    /// A step of Gauss and Newton, shortened until the data cost less than before: far from the blade slopes
+    /// promise what equilibria do not keep.
+    pub(super) fn seek(&mut self, gates: &Gates) -> Result<Step, BeamError> {
+        let (mut step, largest, tallies) = self.wanted(gates)?;
+        let (from, before) = (self.axes(), self.cost(gates, &tallies));
+        let tries = (0..SHORTENED.1).any(|_| {
+            let is_better = self.is_better(&step, gates, before);
+            step *= SHORTENED.0;
+            is_better
+        });
+        let moved_m = if tries { self.moved_m(&from) } else { 0.0 };
+        Ok(Step {
+            largest,
+            moved_m,
+            tallies,
+        })
+    }
+
+    /// Goes a step, and comes back where the data do not cost less there.
+    fn is_better(&mut self, step: &DVector<f64>, gates: &Gates, before: f64) -> bool {
+        let spot = self.spot();
+        self.values += step;
+        self.settle_in(step);
+        let is_better = self.linearise().is_ok() && {
+            let (_, tallies) = self.normal(gates);
+            self.cost(gates, &tallies) < before
+        };
+        if !is_better {
+            self.return_to(spot);
+        }
+        is_better
+    }
+
+    /// What the unknowns cost, by what became of the data and by what was known before.
+    fn cost(&self, gates: &Gates, tallies: &[Tally]) -> f64 {
+        self.surprise(gates.stage) + tallies.iter().map(|tally| tally.cost).sum::<f64>()
+    }
+}
+
+impl Rows<'_> {
+    /// Rows by distances of points, and what became of the data.
+    pub(super) fn collect_near(mut self) -> (Part, Tally) {
+        let seen = &self.adjustment.problem.holds[self.hold].seen;
+        for echo in some(&seen.echoes) {
+            self.add_point(echo);
+        }
+        for edge in some(&seen.edges) {
+            self.add_edge(edge);
+        }
+        self.finish()
+    }
+
+    fn add_point(&mut self, echo: &Echo) {
+        if echo.from_end < MIXED_ECHOES {
+            self.tally.unfit += 1;
+            return;
+        }
+        let lidar = &self.lidars[echo.lidar];
+        let direction = lidar.direction(&echo.direction);
+        let point = lidar.origin + direction * lidar.true_m(echo.range_m, echo.ring);
+        let blade = self.posed.at(self.time_ns(echo.lidar, echo.time_ns));
+        let mesh = &self.adjustment.problem.mesh;
+        let Some(near) = blade.near(mesh, &point, &direction) else {
+            self.tally.missed += 1;
+            return;
+        };
+        let cosine = -near.contact.normal.dot(&direction);
+        let met = self.met(echo, &near.contact, near.off_m, point, cosine);
+        let (gate_m, sigma_m) = (self.gates.echo_m, self.gates.coarse_m()[0]);
+        self.tally.cost += cost(near.off_m, sigma_m, gate_m, sigma_m * sigma_m);
+        if near.off_m.abs() > gate_m {
+            self.tally.rejected.push(met);
+        } else {
+            self.tally.used.push(met);
+            self.add_near(echo, &near, sigma_m);
+        }
+    }
+
+    fn add_near(&mut self, echo: &Echo, near: &Near, sigma_m: f64) {
+        let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / (sigma_m * sigma_m);
+        let time_ns = self.time_ns(echo.lidar, echo.time_ns);
+        let moves = self.fill_row(&near.contact, &near.towards, echo.lidar, time_ns);
+        self.add_row(&near.contact, moves, near.off_m, weight);
+    }
+}
+
+/// Enough of them; an odd stride, for ends of scan lines come by twos.
+fn some<T>(all: &[T]) -> impl Iterator<Item = &T> {
+    all.iter().step_by((all.len() / ENOUGH) | 1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::adjust::Stage;
+    use super::super::sample;
+    use super::*;
+
+    const WIDE: Gates = Gates {
+        echo_m: 3.0,
+        edge_m: 2.0,
+        stage: Stage::Loads,
+    };
+
+    /// The sample with loads that are off by some standard deviations.
+    fn elsewhere() -> Adjustment {
+        let mut adjustment = sample::adjustment(0.0);
+        let first = adjustment.layout.own_at(0);
+        for (unknown, change) in [(first, 0.9), (first + 1, -4.0), (first + 5, 3.0)] {
+            adjustment.shift(unknown, change);
+        }
+        adjustment.linearise().unwrap();
+        adjustment
+    }
+
+    #[test]
+    fn a_blade_whose_rays_mostly_miss_is_found() {
+        let (truth, mut adjustment) = (sample::adjustment(0.0), elsewhere());
+        let far_m = adjustment.moved_m(&truth.axes());
+        assert!(far_m > 0.5, "{far_m}");
+        for _ in 0..6 {
+            adjustment.step(&WIDE).unwrap();
+        }
+        let left_m = adjustment.moved_m(&truth.axes());
+        assert!(left_m < 0.05, "{left_m} of {far_m}");
+    }
+
+    #[test]
+    fn no_step_costs_more() {
+        let mut adjustment = elsewhere();
+        let mut last = f64::INFINITY;
+        for _ in 0..6 {
+            let tallies = adjustment.step(&WIDE).unwrap().tallies;
+            let cost: f64 = tallies.iter().map(|tally| tally.cost).sum();
+            assert!(cost < last + 1e-3, "{cost} after {last}");
+            last = cost;
+        }
+    }
+}
