@@ -186,15 +186,17 @@ struct Line {
 
 /// The line through what chords tell (a value and its variance) whose slope was expected to be `prior`.
 fn line(chords: &[&Chord], prior: Slope, height_m: f64, told: impl Fn(&Chord) -> [f64; 2]) -> Line {
-    let values: Vec<_> = chords.iter().map(|c| (c.height_m, told(c))).collect();
-    let count = values.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, [f64; 2])) -> f64| values.iter().map(of).sum::<f64>() / count;
-    let (at_m, value_m) = (mean(&|v| v.0), mean(&|v| v.1[0]));
+    let count = chords.len() as f64;
+    let at_m = chords.iter().map(|c| c.height_m).sum::<f64>() / count;
+    let mean = |k: usize| chords.iter().map(|c| told(c)[k]).sum::<f64>() / count;
+    let value_m = mean(0);
     let mut precision = prior.u.powi(-2);
     let mut sum = prior.mean * precision;
-    for (height, [value, variance]) in &values {
-        let weight = (height - at_m) / variance.max(EDGE_U_M * EDGE_U_M);
-        precision += weight * (height - at_m);
+    for chord in chords {
+        let [value, variance] = told(chord);
+        let from_m = chord.height_m - at_m;
+        let weight = from_m / variance.max(EDGE_U_M * EDGE_U_M);
+        precision += weight * from_m;
         sum += weight * (value - value_m);
     }
     let slope = Slope {
@@ -203,7 +205,7 @@ fn line(chords: &[&Chord], prior: Slope, height_m: f64, told: impl Fn(&Chord) ->
     };
     Line {
         value_m: value_m + slope.mean * (height_m - at_m),
-        worst_u_m: mean(&|v| v.1[1]).sqrt(),
+        worst_u_m: mean(1).sqrt(),
         slope,
     }
 }
