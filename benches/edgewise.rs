@@ -39,6 +39,7 @@ fn lidar(index: u8, z_m: f64) -> LidarPlan {
         },
         channel_offset_m: 0.007,
         unit_offset_m: 0.004,
+        elevation_u_rad: 0.0,
     }
 }
 

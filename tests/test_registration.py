@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 import lidar_deflect as ld
 from lidar_deflect.calibrate import calibrate
 from lidar_deflect.calibration import Calibration
+from lidar_deflect.config import SensorAxes
 from lidar_deflect.errors import CalibrationError
 from lidar_deflect.measurement import unloaded
 from lidar_deflect.opened import OpenedTest
@@ -137,6 +139,53 @@ def test_a_control_point_off_by_a_hand_is_left_out_by_name(
     assert f"control point {number + 1} on" in said[0]
     errors = np.abs(scenes["edge"].errors(calibration))
     assert errors[:, :3].max() < 1.5 * TURN_RAD
+
+
+def leaning(lidar: Any, turn_rad: NDArray[np.float64]) -> Any:
+    """Give a lidar axes that are off by a turn."""
+    turned = Rotation.from_rotvec(turn_rad).as_matrix() @ np.array(lidar.nominal_rotation())
+    axes = {name: tuple(map(float, turned[:, k])) for k, name in enumerate("xyz")}
+    return lidar.model_copy(update={"axes": SensorAxes.model_validate(axes)})
+
+
+@pytest.mark.parametrize("name", ["edge", "flap"])
+def test_axes_off_by_twenty_degrees_suffice(scenes: dict[str, Scene], name: str) -> None:
+    scene, random = scenes[name], np.random.default_rng(3)
+    turns = [random.normal(size=3) for _ in scene.config.lidars]
+    lidars = tuple(
+        leaning(lidar, np.radians(20.0) * turn / np.linalg.norm(turn))
+        for lidar, turn in zip(scene.config.lidars, turns, strict=True)
+    )
+    calibration = calibrate(scene.config.model_copy(update={"lidars": lidars}), scene.clouds)
+    errors = np.abs(scene.errors(calibration))
+    assert errors[:, :3].max() < TURN_RAD
+    assert errors[:, 3:5].max() < ACROSS_M
+
+
+@pytest.mark.parametrize("name", ["edge", "flap"])
+def test_without_axes_ground_and_wall_tell_how_a_lidar_stands(
+    scenes: dict[str, Scene], name: str
+) -> None:
+    scene = scenes[name]
+    lidars = tuple(lidar.model_copy(update={"axes": None}) for lidar in scene.config.lidars)
+    calibration = calibrate(scene.config.model_copy(update={"lidars": lidars}), scene.clouds)
+    errors = np.abs(scene.errors(calibration))
+    assert errors[:, :3].max() < TURN_RAD
+    assert errors[:, 3:5].max() < ACROSS_M
+
+
+def test_what_is_missing_is_said_where_nothing_tells_how_a_lidar_stands(
+    scenes: dict[str, Scene],
+) -> None:
+    scene = scenes["edge"]
+    lidars = tuple(lidar.model_copy(update={"axes": None}) for lidar in scene.config.lidars)
+    ground = tuple(point for point in scene.config.control if point.on == "ground")
+    config = scene.config.model_copy(update={"lidars": lidars, "control": ground})
+    with pytest.raises(CalibrationError, match="lidar L1 has no axes") as caught:
+        calibrate(config, scene.clouds)
+    assert caught.value.code == "calibration.no_start"
+    assert ("surveyed", "ground") in caught.value.facts
+    assert "with position_m two of ground, walls and targets" in str(caught.value.hint)
 
 
 def test_two_lidars_that_are_exchanged_are_refused(scenes: dict[str, Scene]) -> None:

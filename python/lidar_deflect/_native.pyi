@@ -515,9 +515,15 @@ class StaticHold:
         targets: Sequence[tuple[Sequence[float], float]],
         range_rad: float,
     ) -> tuple[float, int] | None: ...
+    def stand(
+        self,
+        surfaces: Sequence[Mapping[str, Any]],
+        targets: Sequence[tuple[Sequence[float], float | None]],
+        position_m: Sequence[float] | None,
+    ) -> tuple[list[list[float]], list[float], bool] | None: ...
     def sheet(
-        self, expected_m: Sequence[float], size_m: float, within_m: float
-    ) -> tuple[tuple[float, float, float], tuple[float, float], int] | None: ...
+        self, expected_m: Sequence[float], up: Sequence[float], size_m: float, within_m: float
+    ) -> tuple[tuple[Any, ...], int] | None: ...
     def __len__(self) -> int: ...
 
 def adjust_network(

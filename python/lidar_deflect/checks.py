@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from lidar_deflect import instruments
+from lidar_deflect import instruments, network
 from lidar_deflect.geometry import read_geometry
+from lidar_deflect.starts import NEEDED, can_start
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -74,12 +75,15 @@ def _lidars(config: Config, capture: Capture) -> Iterator[Finding]:
 
 
 def _poses(config: Config) -> Iterator[Finding]:
+    surfaces = network.surveyed_surfaces(config)
     for lidar in config.lidars:
-        if lidar.position_m is None or lidar.nominal_rotation() is None:
+        alone = not network.can_solve(config)
+        has_both = lidar.position_m is not None and lidar.nominal_rotation() is not None
+        if not has_both and (alone or not can_start(lidar, surfaces, config.targets)):
             yield Finding(
                 "check.no_pose",
                 f"lidar {lidar.id} has no position_m or no axes, so it cannot be calibrated",
-                "survey its position, and say where its axes point",
+                NEEDED,
                 CONFIGURATION,
             )
     if sum(point.on == "wall" for point in config.control) < 3:

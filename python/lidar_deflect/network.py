@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect import _native
-from lidar_deflect.errors import CalibrationError
-from lidar_deflect.mounting import mounted, optical_centre_m
-from lidar_deflect.registration import UP, rotation_onto, surveyed_plane
+from lidar_deflect.registration import UP, surveyed_plane
+from lidar_deflect.starts import first_pose, given
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -36,12 +35,6 @@ MARGIN_M: Mapping[str, float] = {"ground": 15.0}
 """A surface is believed this far beyond its outermost control points."""
 
 WALL_MARGIN_M = 5.0
-
-WALL_HEIGHT_M = 0.5
-"""The search for a wall leaves out what lies lower above the ground than this."""
-
-SHEET_ALONG_U_M = 0.03
-"""Range to a retroreflecting sheet is trusted to this: its strong echo falsifies it."""
 
 SHEET_NEAR_M, SHEET_NEAR_RAD = 0.3, 0.03
 """A sheet is looked for this near to its place, and this much more per metre of range."""
@@ -67,6 +60,14 @@ class Surface:
         across = np.cross(self.normal, along)
         away = self.points_m - self.origin_m
         return [float(np.abs(away @ axis).max()) + self.margin_m for axis in (along, across)]
+
+    def given(self) -> dict[str, Any]:
+        """Return it as the core takes it."""
+        return {
+            "origin_m": self.origin_m.tolist(),
+            "normal": self.normal.tolist(),
+            "half_m": self.half_m(),
+        }
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,8 +120,10 @@ class Solution:
 
 
 def can_solve(config: Config) -> bool:
-    """Whether the survey holds a datum: three or more points on the ground, or targets."""
-    return sum(point.on == "ground" for point in config.control) >= 3 or len(config.targets) >= 3
+    """Whether the survey holds a datum: the ground, three other surfaces, or three targets."""
+    surfaces = surveyed_surfaces(config)
+    has_ground = any(surface.name == "ground" for surface in surfaces)
+    return has_ground or len(surfaces) >= 3 or len(config.targets) >= 3
 
 
 def solve(config: Config, clouds: Mapping[str, HoldCloud | _native.StaticHold]) -> Solution:
@@ -156,14 +159,8 @@ def solve(config: Config, clouds: Mapping[str, HoldCloud | _native.StaticHold]) 
             {"rotation": pose[:3, :3].tolist(), "position_m": pose[:3, 3].tolist(), "channels": n}
             for pose, n in zip(starts, map(_channels, holds), strict=True)
         ],
-        [
-            {"origin_m": s.origin_m.tolist(), "normal": s.normal.tolist(), "half_m": s.half_m()}
-            for s in surfaces
-        ],
-        [
-            (list(target.xyz_m), target.size_m / 2 if target.kind == "sphere" else None)
-            for target in config.targets
-        ],
+        [surface.given() for surface in surfaces],
+        [given(target) for target in config.targets],
         known,
         priors=[
             config.calibrate.channel_offset_u_m,
@@ -208,82 +205,6 @@ def _channels(hold: _native.StaticHold) -> int:
     return int(ring.max()) + 1 if len(ring) else 1
 
 
-def first_pose(
-    lidar: Lidar,
-    hold: _native.StaticHold,
-    surfaces: Sequence[Surface],
-    targets: Sequence[Target] = (),
-) -> NDArray[np.float64]:
-    """Pose of one lidar in closed form, shape (4, 4): the given one, else ground, wall, targets."""
-    if lidar.world_from_sensor:
-        return np.array(lidar.world_from_sensor, dtype=np.float64)
-    rotation = mounted(
-        lidar, hint="give position_m and axes of every lidar, or a world_from_sensor to start from"
-    )
-    up = next((surface.normal for surface in surfaces if surface.name == "ground"), UP)
-    seen = hold.ground(rotation.T @ up)
-    if seen is None:
-        raise CalibrationError(
-            f"lidar {lidar.id} sees no ground where its axes put it",
-            code="calibration.no_ground",
-            hint="check the axes of this lidar",
-        )
-    rotation = rotation_onto(rotation @ np.array(seen[0]), up) @ rotation
-    pose = np.eye(4)
-    pose[:3, 3] = optical_centre_m(lidar, rotation)
-    turned = _turned_to_walls(rotation, pose[:3, 3], lidar, hold, surfaces, abs(seen[1]))
-    if turned is None:
-        turned = _turned_to_targets(rotation, pose[:3, 3], lidar, hold, targets)
-    pose[:3, :3] = rotation if turned is None else turned
-    return pose
-
-
-def _turned_to_walls(
-    rotation: NDArray[np.float64],
-    position_m: NDArray[np.float64],
-    lidar: Lidar,
-    hold: _native.StaticHold,
-    surfaces: Sequence[Surface],
-    beneath_m: float,
-) -> NDArray[np.float64] | None:
-    """Turn a levelled lidar about the vertical until the first wall it sees is in place."""
-    beams = hold.beams()
-    points = (beams["direction"] * beams["range_m"][:, None]) @ rotation.T
-    for wall in surfaces:
-        if abs(wall.normal[1]) > 0.5:
-            continue
-        try:
-            yaw_rad, *_ = _native.yaw_from_wall(
-                np.ascontiguousarray(points, dtype=np.float32),
-                normal=wall.normal,
-                distance_m=float(wall.normal @ (wall.origin_m - position_m)),
-                yaw_range_rad=float(np.radians(2.0 * lidar.axes_u_deg)),
-                min_height_m=WALL_HEIGHT_M - beneath_m,
-            )
-        except CalibrationError:
-            continue
-        return np.asarray(_native.rotation_about_up(yaw_rad) @ rotation)
-    return None
-
-
-def _turned_to_targets(
-    rotation: NDArray[np.float64],
-    position_m: NDArray[np.float64],
-    lidar: Lidar,
-    hold: _native.StaticHold,
-    targets: Sequence[Target],
-) -> NDArray[np.float64] | None:
-    """Turn a levelled lidar about the vertical until what is bright lies on targets."""
-    found = hold.turn_to_targets(
-        rotation.tolist(),
-        [((np.array(t.xyz_m) - position_m).tolist(), t.size_m / 2) for t in targets],
-        float(np.radians(2.0 * lidar.axes_u_deg)),
-    )
-    if found is None:
-        return None
-    return np.asarray(_native.rotation_about_up(found[0]) @ rotation)
-
-
 def _sights(
     targets: Sequence[Target],
     holds: Sequence[_native.StaticHold],
@@ -298,10 +219,11 @@ def _sights(
         for k, target in sheets:
             expected = pose[:3, :3].T @ (np.array(target.xyz_m) - pose[:3, 3])
             within_m = SHEET_NEAR_M + SHEET_NEAR_RAD * float(np.linalg.norm(expected))
-            found = hold.sheet(expected.tolist(), target.size_m, within_m)
+            up = pose[:3, :3].T @ UP
+            found = hold.sheet(expected.tolist(), up.tolist(), target.size_m, within_m)
             if found is not None:
-                sights.append((number, k, *found[:2], SHEET_ALONG_U_M))
-                echoes.append((found[2],))
+                sights.append((number, k, found[0]))
+                echoes.append((found[1],))
     return {"target": surveyed, "sight": sights, "sheet_echoes": echoes}
 
 

@@ -226,6 +226,9 @@ class Sensors(Model):
         default=7.0, description="sigma of the offset of each laser"
     )
     unit_offset_mm: NotNegative = Field(default=4.0, description="sigma of the offset of each unit")
+    elevation_deg: NotNegative = Field(
+        default=0.0, description="sigma of an elevation offset that all beams of a unit share"
+    )
     incidence_bias_mm: Number = Field(
         default=0.0, description="error times (1 / cos(incidence) - 1)"
     )

@@ -138,6 +138,7 @@ def _lidar_plan(scene: Scene, lidar: Lidar) -> dict[str, Any]:
         "clock_locked": lidar.clock.locked,
         "channel_offset_m": scene.sensors.channel_offset_mm * 1e-3,
         "unit_offset_m": scene.sensors.unit_offset_mm * 1e-3,
+        "elevation_u_rad": math.radians(scene.sensors.elevation_deg),
         "kick": None
         if kick is None
         else {

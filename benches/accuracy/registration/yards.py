@@ -3,7 +3,8 @@
 A bare yard has neither wall nor target: the mounting alone holds the turns about the vertical.
 
 Disturbances come from wider families than an adjustment assumes: heavy tails, roughness that is
-alike over metres, walls that bow and lean, ranges that depend on incidence and brightness.
+alike over metres, walls that bow and lean, ranges that depend on incidence and brightness,
+elevations of a whole unit that are off.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ FIRST_SEED = {"development": 3_000_000, "verification": 4_000_000}
 YARDS = ("wall", "bent wall", "targets", "rough ground", "bare")
 SENSORS = ("vlp16", "xt32", "vlp32c", "os1-32")
 NOISE_MM = {"vlp16": 14.0, "xt32": 6.0, "vlp32c": 12.0, "os1-32": 10.0}
+ELEVATION_DEG = 0.02
 HOLD_S = 0.6
 APART_M = 8.0
 
@@ -67,6 +69,7 @@ def scene(case: Case) -> Scene:
         "sensors": {
             "noise_mm": NOISE_MM[case.sensor],
             "noise_freedom": 4 if heavy else 0,
+            "elevation_deg": ELEVATION_DEG if heavy else 0.0,
             "incidence_bias_mm": float(random.normal(0.0, 1.0)) if heavy else 0.0,
             "faint_bias_mm": float(random.normal(0.0, 0.7)) if heavy else 0.0,
         },

@@ -67,6 +67,8 @@ const LEARNING_ROUNDS: usize = 2;
 const LEAST_OFFSET_U_M: f64 = 2e-3;
 /// Prior sigma of a unit's error of range to retroreflectors, metres.
 const RETRO_U_M: f64 = 0.02;
+/// Prior sigma of how far a sphere is from round on the side that one lidar sees, metres.
+const SKIN_U_M: f64 = 1e-3;
 /// Prior sigma of a model's error of range to what is met at 60 degrees from its normal, metres.
 const SLANT_U_M: f64 = 1.5e-3;
 /// A turn less sure than this is held by no observation, radians.
@@ -278,7 +280,9 @@ impl<'a> Work<'a> {
             .flat_map(|(lidar, hold)| select::met(&self.state, hold, lidar, gate))
             .collect();
         self.select_spheres(gate);
-        if self.met.is_empty() && self.spheres.is_empty() {
+        let mut known = self.network.known.iter();
+        let has_sight = known.any(|known| matches!(known, Known::Sight(_)));
+        if self.met.is_empty() && self.spheres.is_empty() && !has_sight {
             return Err(NetworkError::NothingMet {
                 rays: self.network.holds.iter().map(|h| h.beams.len()).sum(),
                 surfaces: self.state.surfaces.len(),
@@ -433,6 +437,10 @@ impl<'a> Work<'a> {
         targets.for_each(|k| normal.hold(k, 0.0, LOOSE_M));
         for (lidar, at) in self.state.lidars.iter().zip(&self.layout.retro) {
             normal.hold(*at, lidar.retro_m, RETRO_U_M);
+        }
+        for (lidar, at) in self.state.lidars.iter().zip(&self.layout.skins) {
+            let skins = lidar.skins_m.iter().enumerate();
+            skins.for_each(|(k, skin_m)| normal.hold(at + k, *skin_m, SKIN_U_M));
         }
         let slants = self.state.lidars.iter().map(|lidar| lidar.slant_m);
         let slants: BTreeMap<_, _> = self.layout.slants.iter().zip(slants).collect();

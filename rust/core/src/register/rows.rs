@@ -29,7 +29,7 @@ pub struct Row {
 }
 
 impl Row {
-    fn vector(&mut self, start: usize, values: &Vector3<f64>) {
+    pub(super) fn vector(&mut self, start: usize, values: &Vector3<f64>) {
         let entries = values.iter().enumerate();
         self.border
             .extend(entries.map(|(k, value)| (start + k, *value)));
@@ -178,8 +178,8 @@ fn ray_sigma(
 
 /// Rays that pass a sphere's middle by more than this share of its radius meet it nowhere in particular.
 const RIM: f64 = 0.98;
-/// How round and how steady a sphere is: alike for all rays of one lidar on it, metres.
-const ROUND_U_M: f64 = 1e-3;
+/// How smooth a sphere is, metres; alike for as many rays as there are, since patches are large.
+const SMOOTH_U_M: f64 = 3e-4;
 
 /// A bright echo of a sphere, of which its lidar has `alike`; None where the model's ray misses it
 /// or the target is no sphere. `slack_m` is what the poses may still be off.
@@ -193,6 +193,7 @@ pub fn on_sphere(
 ) -> Option<Row> {
     let (of, target) = (&state.lidars[met.lidar], &state.targets[met.target]);
     let radius_m = target.radius_m?;
+    let skin_m = of.skins_m.get(met.target)?;
     let ray = aimed(of, beam);
     let from = target.centre_m - of.position_m;
     let ahead_m = from.dot(&ray.direction);
@@ -207,8 +208,8 @@ pub fn on_sphere(
     let aim_m = DIRECTION_U_RAD * meets_m * (1.0 - closing * closing).max(0.0).sqrt() / closing;
     let variance = beam.sigma_m.powi(2) + aim_m.powi(2) + slack_m.powi(2);
     let mut row = Row {
-        residual: ray.range_m + of.retro_m - meets_m,
-        sigma: (variance + alike * ROUND_U_M.powi(2)).sqrt(),
+        residual: ray.range_m + of.retro_m + skin_m - meets_m,
+        sigma: (variance + alike * SMOOTH_U_M.powi(2)).sqrt(),
         ..Row::default()
     };
     let slope = normal / closing;
@@ -216,6 +217,7 @@ pub fn on_sphere(
     row.ray(layout.lidars[met.lidar], beam, &slope, &arm, &lifted);
     row.vector(layout.targets[met.target], &-slope);
     row.border.push((layout.retro[met.lidar], 1.0));
+    row.border.push((layout.skins[met.lidar] + met.target, 1.0));
     Some(row)
 }
 
@@ -347,51 +349,4 @@ pub fn target(
         border: vec![(layout.targets[target] + k, -1.0)],
         ..Row::default()
     })
-}
-
-/// A target as a lidar sees it: two rows across the ray and one along it, metres.
-#[derive(Debug, Clone, Copy)]
-pub struct Sight {
-    /// Which lidar.
-    pub lidar: usize,
-    /// Which target.
-    pub target: usize,
-    /// Its centre, sensor frame, metres.
-    pub centre_m: Vector3<f64>,
-    /// Standard deviations across the ray, in the plane of rotation and out of it, metres.
-    pub across_u_m: [f64; 2],
-    /// Standard deviation along the ray, metres; large where a reflector falsifies the range.
-    pub along_u_m: f64,
-}
-
-/// See [`Sight`].
-pub fn sight(state: &State, layout: &Layout, sight: &Sight) -> [Row; 3] {
-    let of = &state.lidars[sight.lidar];
-    let direction = Unit::new_normalize(sight.centre_m);
-    let frame = axes_around(&direction);
-    // frame . R^T (T - t): a turn w of R moves it by -w . ((T - t) x axis).
-    let from = state.targets[sight.target].centre_m - of.position_m;
-    let seen = of.rotation.inverse() * from;
-    let [level_u_m, upright_u_m] = sight.across_u_m;
-    let sigmas = [level_u_m, upright_u_m, sight.along_u_m];
-    let start = layout.lidars[sight.lidar];
-    [0, 1, 2].map(|k| {
-        let axis = of.rotation * frame[k];
-        let mut row = Row {
-            residual: frame[k].dot(&(sight.centre_m - seen)),
-            sigma: sigmas[k],
-            ..Row::default()
-        };
-        row.vector(start + Term::ROTATION, &-axis.cross(&from));
-        row.vector(start + Term::POSITION, &axis);
-        row.vector(layout.targets[sight.target], &-axis);
-        row
-    })
-}
-
-/// Level in the plane of rotation, upright, along a direction of the sensor.
-fn axes_around(direction: &Unit<Vector3<f64>>) -> [Vector3<f64>; 3] {
-    let turning = Vector3::z().cross(direction);
-    let level = turning.try_normalize(1e-9).unwrap_or_else(Vector3::x);
-    [level, direction.cross(&level), direction.into_inner()]
 }

@@ -45,7 +45,7 @@ pub fn ground(hold: &Hold, up_in_sensor: &Unit<Vector3<f64>>) -> Option<Plane> {
     (refined.count >= LEAST).then_some(refined.estimate)
 }
 
-fn point(beam: &Beam) -> [f64; 3] {
+pub(super) fn point(beam: &Beam) -> [f64; 3] {
     (beam.direction.into_inner() * beam.range_m).into()
 }
 

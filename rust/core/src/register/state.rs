@@ -25,6 +25,8 @@ pub struct LidarState {
     pub offsets_m: Vec<f64>,
     /// The same of echoes of retroreflectors on top, metres.
     pub retro_m: f64,
+    /// The same of each target on top: how far it is from round on the side that this lidar sees, metres.
+    pub skins_m: Vec<f64>,
     /// The same of what is met slantwise on top, times 1 / cos(incidence) - 1, metres.
     pub slant_m: f64,
 }
@@ -67,6 +69,8 @@ pub struct Layout {
     pub targets: Vec<usize>,
     /// Error of range to retroreflectors, by lidar; empty without targets.
     pub retro: Vec<usize>,
+    /// First of the targets' own errors of range, by lidar.
+    pub skins: Vec<usize>,
     /// Error of range to what is met slantwise, by lidar: one unknown of all with as many channels, as
     /// optics and electronics of a model make it.
     pub slants: Vec<usize>,
@@ -96,6 +100,8 @@ impl State {
         layout.targets = self.targets.iter().map(|_| next(3)).collect();
         let bright = self.lidars.iter().filter(|_| !self.targets.is_empty());
         layout.retro = bright.map(|_| next(1)).collect();
+        let skins = self.lidars.iter().map(|lidar| lidar.skins_m.len());
+        layout.skins = skins.map(&mut next).collect();
         let mut of_kind = BTreeMap::new();
         let kinds = self.lidars.iter().map(|lidar| lidar.offsets_m.len());
         layout.slants = kinds
@@ -156,6 +162,14 @@ impl State {
         }
         for (lidar, at) in self.lidars.iter_mut().zip(&layout.retro) {
             lidar.retro_m += border[*at];
+        }
+        for (lidar, at) in self.lidars.iter_mut().zip(&layout.skins) {
+            let steps = &border[*at..];
+            lidar
+                .skins_m
+                .iter_mut()
+                .zip(steps)
+                .for_each(|(x, dx)| *x += dx);
         }
         for (lidar, at) in self.lidars.iter_mut().zip(&layout.slants) {
             lidar.slant_m += border[*at];

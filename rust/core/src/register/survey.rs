@@ -2,7 +2,8 @@
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
-use super::rows::{self, Row, Sight};
+use super::rows::{self, Row};
+use super::sight::Sight;
 use super::state::{Layout, State};
 
 /// One thing that somebody measured or knows.
@@ -99,7 +100,7 @@ impl Known {
             Self::Target { target, xyz_m, u_m } => {
                 rows::target(state, layout, *target, xyz_m, *u_m).into()
             }
-            Self::Sight(sight) => rows::sight(state, layout, sight).into(),
+            Self::Sight(sight) => sight.rows(state, layout).into(),
         }
     }
 
@@ -118,7 +119,7 @@ impl Known {
                 s.lidar,
                 0,
                 s.target,
-                s.across_u_m[0].min(s.across_u_m[1]).min(s.along_u_m),
+                s.seen.sigma_m.into_iter().fold(f64::INFINITY, f64::min),
             ),
         };
         let speaks_of = |index: usize, count: usize| index == 0 || index < count;
@@ -137,6 +138,7 @@ impl Known {
 mod tests {
     use super::super::field::{Field, Roughness};
     use super::super::hold::Beam;
+    use super::super::sheet::Sheet;
     use super::super::state::LidarState;
     use super::super::surface::{Surface, SurfaceFrame};
     use super::super::target::{OnSphere, Target};
@@ -152,6 +154,7 @@ mod tests {
             scale: 2e-4,
             offsets_m: vec![0.01, -0.02],
             retro_m: 0.004,
+            skins_m: vec![0.002],
             slant_m: 0.002,
         };
         let normal = Unit::new_normalize(Vector3::new(-0.02, 1.0, 0.0123));
@@ -211,9 +214,12 @@ mod tests {
         let sight = Sight {
             lidar: 1,
             target: 0,
-            centre_m: Vector3::new(1.0, 0.7, -4.0),
-            across_u_m: [0.001, 0.02],
-            along_u_m: 0.02,
+            seen: Sheet {
+                centre_m: Vector3::new(1.0, 0.7, -4.0),
+                lean: 0.07,
+                sigma_m: [0.001, 0.02, 0.02],
+                shares: vec![(0, 0.4), (1, 0.6)],
+            },
         };
         vec![
             Known::Control {

@@ -1,7 +1,7 @@
 //! Targets: retroreflecting spheres and sheets, found by brightness, size and place.
 //!
-//! A sphere's echoes are rays of the adjustment like those on the ground. A sheet is reduced to its
-//! middle: halfway between its edges on every ring, between its outermost rings, at its mean range.
+//! A sphere's echoes are rays of the adjustment like those on the ground; a sheet is reduced to its middle
+//! ([`super::sheet`]).
 
 use std::collections::BTreeMap;
 
@@ -195,69 +195,6 @@ fn agreeing(pairs: &[(usize, f64)], turn: f64) -> (f64, usize) {
     (nearest.values().sum::<f64>() / count.max(1) as f64, count)
 }
 
-/// Middle of a sheet, sensor frame, with its standard deviations, metres.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sheet {
-    /// Middle.
-    pub centre_m: Vector3<f64>,
-    /// Level, upright across the ray.
-    pub across_u_m: [f64; 2],
-    /// Echoes.
-    pub count: usize,
-}
-
-/// Edges of a sheet are no sharper than this, metres.
-const EDGE_U_M: f64 = 1e-3;
-
-/// The sheet of size `size_m` nearest to a place, if one is within `within_m`.
-pub fn sheet(
-    hold: &Hold,
-    clusters: &[Cluster],
-    expected_m: &Vector3<f64>,
-    size_m: f64,
-    within_m: f64,
-) -> Option<Sheet> {
-    let like = clusters
-        .iter()
-        .filter(|c| c.radius_m < size_m + 0.1)
-        .map(|c| ((c.middle_m - expected_m).norm(), c));
-    let (apart_m, nearest) = like.min_by(|a, b| a.0.total_cmp(&b.0))?;
-    (apart_m < within_m).then(|| middle(hold, nearest, size_m))
-}
-
-fn middle(hold: &Hold, cluster: &Cluster, size_m: f64) -> Sheet {
-    let range_m = cluster.middle_m.norm();
-    let direction = cluster.middle_m / range_m;
-    let level = Vector3::z().cross(&direction).normalize();
-    let upright = direction.cross(&level);
-    let mut rings: BTreeMap<u16, (f64, f64, usize, f64)> = BTreeMap::new();
-    for echo in cluster.echoes.iter().map(|k| &hold.bright[*k]) {
-        let point = echo.direction.into_inner() * echo.range_m;
-        let (across, up) = (level.dot(&point), upright.dot(&point));
-        let ring = rings.entry(echo.ring).or_insert((across, across, 0, 0.0));
-        *ring = (
-            ring.0.min(across),
-            ring.1.max(across),
-            ring.2 + 1,
-            ring.3 + up,
-        );
-    }
-    let count = rings.len() as f64;
-    let across_m = rings.values().map(|r| 0.5 * (r.0 + r.1)).sum::<f64>() / count;
-    // The gaps before the first and behind the last echo are alike on average.
-    let gaps = rings.values().map(|r| ((r.1 - r.0) / r.2 as f64).powi(2));
-    let level_u_m = (0.5 * gaps.sum::<f64>()).sqrt() / count;
-    let heights = rings.values().map(|r| r.3 / r.2 as f64);
-    let (low, high) = heights.fold((f64::MAX, f64::MIN), |(l, h), y| (l.min(y), h.max(y)));
-    // All rings that met it lie on it, so its middle has this much room.
-    let room_m = (size_m - (high - low)).max(0.1 * size_m);
-    Sheet {
-        centre_m: direction * range_m + level * across_m + upright * (0.5 * (low + high)),
-        across_u_m: [level_u_m.hypot(EDGE_U_M), room_m / 12f64.sqrt()],
-        count: cluster.echoes.len(),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -336,49 +273,5 @@ mod tests {
             half_m: 0.2,
         }];
         assert!(turn(&[], &Rotation3::identity(), &wanted, 0.35).is_none());
-    }
-
-    #[test]
-    fn the_middle_of_a_sheet_lies_between_its_edges() {
-        let mut hold = Hold::default();
-        let centre = Vector3::new(8.0, 0.05, 0.02);
-        for azimuth in -200..200 {
-            for ring in 0..20u16 {
-                let (y, z) = (0.005 * f64::from(azimuth), 0.07 * f64::from(ring) - 0.7);
-                if (y - 0.05).abs() <= 0.15 && (z - 0.02).abs() <= 0.15 {
-                    let point = Vector3::new(8.0, y, z);
-                    hold.bright.push(Beam {
-                        direction: Unit::new_normalize(point),
-                        range_m: point.norm(),
-                        sigma_m: 0.005,
-                        intensity: 220.0,
-                        ring,
-                        cell: 0,
-                    });
-                }
-            }
-        }
-        let found = sheet(
-            &hold,
-            &clusters(&hold),
-            &Vector3::new(8.1, 0.1, 0.1),
-            0.3,
-            0.5,
-        )
-        .unwrap();
-        let from = found.centre_m - centre;
-        assert!(from.y.abs() < 3.0 * found.across_u_m[0], "{from}");
-        assert!(from.z.abs() < 2.0 * found.across_u_m[1], "{from}");
-        assert!(from.x.abs() < 2e-3, "{from}"); // the sheet is flat, its corners are farther
-        assert!(
-            sheet(
-                &hold,
-                &clusters(&hold),
-                &Vector3::new(3.0, 0.1, 0.1),
-                0.3,
-                0.5
-            )
-            .is_none()
-        );
     }
 }

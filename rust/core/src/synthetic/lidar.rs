@@ -58,6 +58,8 @@ pub struct LidarPlan {
     pub channel_offset_m: f64,
     /// Standard deviation of the range offset of the unit, metres.
     pub unit_offset_m: f64,
+    /// Standard deviation of an elevation offset that all its beams share, rad.
+    pub elevation_u_rad: f64,
     /// What moves it during the test.
     pub kick: Option<Kick>,
     /// From when to when nothing arrives from it, seconds of scene time.
@@ -73,6 +75,8 @@ pub struct Lidar {
     pub world_from_sensor: WorldFromSensor,
     /// Errors of range by ring, metres.
     pub range_offset_m: Vec<f64>,
+    /// Its beams point this far above where the maker says, rad.
+    pub elevation_rad: f64,
     start: Timestamp,
     first_ns: i64,
     /// Number of the first row since the rotor passed zero, for sensors that the encoder paces.
@@ -97,6 +101,7 @@ impl Lidar {
         let mut lidar = Self {
             world_from_sensor: WorldFromSensor::new(rotation, plan.position_m),
             range_offset_m,
+            elevation_rad: 0.0,
             start,
             first_ns: stream.between(0.0, plan.packet_ns()) as i64,
             first_row: 0,
@@ -104,6 +109,7 @@ impl Lidar {
             rotation,
             plan,
         };
+        lidar.elevation_rad = lidar.plan.elevation_u_rad * stream.normal();
         if let Pace::Encoder(rows_per_turn) = lidar.plan.sensor.writer.pace() {
             let turns = lidar.turned_rad(lidar.first_ns as f64) / TAU;
             let rows = lidar.plan.sensor.writer.rows() as u32;
@@ -212,7 +218,7 @@ impl Lidar {
         let turned = rotation * Rotation3::from_axis_angle(&Vector3::z_axis(), -azimuth_rad);
         Ray {
             origin_m: position_m + turned * shot.origin_m,
-            direction: turned * shot.direction,
+            direction: turned * raised(&shot.direction, self.elevation_rad),
         }
     }
 
@@ -224,6 +230,17 @@ impl Lidar {
     /// Largest elevation of a beam, rad.
     pub fn reach_rad(&self) -> f64 {
         self.plan.sensor.reach_rad
+    }
+}
+
+/// A direction whose elevation above the plane of rotation is larger by an angle, rad.
+fn raised(direction: &Vector3<f64>, elevation_rad: f64) -> Vector3<f64> {
+    if elevation_rad == 0.0 {
+        return *direction;
+    }
+    match Vector3::z().cross(direction).try_normalize(1e-9) {
+        Some(level) => Rotation3::new(level * -elevation_rad) * direction,
+        None => *direction, // along the axis of rotation there is no elevation
     }
 }
 
@@ -259,6 +276,7 @@ pub(super) mod tests {
             clock,
             channel_offset_m: 0.01,
             unit_offset_m: 0.0,
+            elevation_u_rad: 0.0,
             kick: None,
             silent_s: Vec::new(),
         };
@@ -289,6 +307,27 @@ pub(super) mod tests {
         let point = lidar.sensor_from_world(&ray.at(20.0));
         assert!((point.y / point.x + 0.3f64.tan()).abs() < 1e-6);
         assert!((point.z - 20.0 * 15f64.to_radians().sin() + 0.011_23).abs() < 2e-5);
+    }
+
+    #[test]
+    fn an_elevation_offset_lifts_every_ray_alike() {
+        let exact = lidar(Clock::default());
+        let plan = LidarPlan {
+            elevation_u_rad: 1e-3,
+            ..exact.plan.clone()
+        };
+        let lifted = Lidar::new(plan, 3, 0, Timestamp(1_718_000_000_000_000_000));
+        assert!(lifted.elevation_rad.abs() > 1e-5);
+        assert_eq!(lifted.range_offset_m, exact.range_offset_m); // all else is drawn as before
+        for ring in [0, 7, 15] {
+            let shot = exact.plan.sensor.shots[0][ring].unwrap();
+            let elevation = |lidar: &Lidar| {
+                let ray = lidar.ray_at(&shot, 0.0, 0.3);
+                (lidar.rotation.inverse() * ray.direction).z.asin()
+            };
+            let by = elevation(&lifted) - elevation(&exact);
+            assert!((by - lifted.elevation_rad).abs() < 1e-9, "{by}");
+        }
     }
 
     #[test]

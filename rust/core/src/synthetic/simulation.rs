@@ -262,6 +262,7 @@ pub(super) mod tests {
             },
             channel_offset_m: 0.005,
             unit_offset_m: 0.005,
+            elevation_u_rad: 0.0,
             kick: None,
             silent_s: Vec::new(),
         }

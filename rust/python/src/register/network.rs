@@ -3,7 +3,9 @@
 use lidar_deflect_core::register::hold::{self, Beam, Echoes, Hold, HoldParams};
 use lidar_deflect_core::register::judged::Judged;
 use lidar_deflect_core::register::network::{self, Adjusted, Network, Priors};
-use lidar_deflect_core::register::rows::Sight;
+use lidar_deflect_core::register::search::{self, Yard};
+use lidar_deflect_core::register::sheet::{self, Looked, Sheet};
+use lidar_deflect_core::register::sight::Sight;
 use lidar_deflect_core::register::start;
 use lidar_deflect_core::register::state::{LidarState, State};
 use lidar_deflect_core::register::surface::{Surface, SurfaceFrame};
@@ -136,17 +138,49 @@ impl StaticHold {
         target::turn(&clusters, &rotation(&levelled), &wanted, range_rad)
     }
 
-    /// The sheet nearest to a place of the sensor frame: middle, deviations level and upright, echoes.
+    /// The sheet nearest to a place of the sensor frame, which hangs by the vertical `up`: middle, lean,
+    /// deviations across its upright edges, along them and along the ray, shares of channels; echoes.
     fn sheet(
         &self,
         expected_m: [f64; 3],
+        up: [f64; 3],
         size_m: f64,
         within_m: f64,
-    ) -> Option<([f64; 3], [f64; 2], usize)> {
-        let clusters = target::clusters(&self.0);
-        let expected = Vector3::from(expected_m);
-        let found = target::sheet(&self.0, &clusters, &expected, size_m, within_m)?;
-        Some((found.centre_m.into(), found.across_u_m, found.count))
+    ) -> Option<(RawSheet, usize)> {
+        let looked = Looked {
+            expected_m: Vector3::from(expected_m),
+            up: Unit::try_new(Vector3::from(up), 1e-9)?,
+            size_m,
+            within_m,
+        };
+        let (found, echoes) = sheet::sheet(&self.0, &target::clusters(&self.0), &looked)?;
+        let seen = (
+            found.centre_m.into(),
+            found.lean,
+            found.sigma_m,
+            found.shares,
+        );
+        Some((seen, echoes))
+    }
+
+    /// How it stands, from the surveyed surfaces and targets that it sees, and its place where that was
+    /// surveyed: rotation, position, whether nothing else fits nearly as well; None where nothing fits.
+    fn stand(
+        &self,
+        surfaces: Vec<RawSurface>,
+        targets: Vec<([f64; 3], Option<f64>)>,
+        position_m: Option<[f64; 3]>,
+    ) -> Option<(Rows3, [f64; 3], bool)> {
+        let surfaces: Vec<_> = surfaces.iter().map(surface).collect();
+        let targets: Vec<_> = targets.iter().map(as_target).collect();
+        let yard = Yard {
+            surfaces: &surfaces,
+            targets: &targets,
+            position_m: position_m.map(Vector3::from),
+        };
+        let found = search::stand(&self.0, &yard)?;
+        let rotation: Rows3 = found.stand.rotation.matrix().transpose().into();
+        Some((rotation, found.stand.position_m.into(), found.is_clear()))
     }
 
     fn __len__(&self) -> usize {
@@ -179,7 +213,8 @@ struct RawSurface {
 }
 
 /// Lidar, target, centre in the sensor's frame (m), its deviations across the ray and along it (m).
-type RawSight = (usize, usize, [f64; 3], [f64; 2], f64);
+type RawSheet = ([f64; 3], f64, [f64; 3], Vec<(u16, f64)>);
+type RawSight = (usize, usize, RawSheet);
 
 /// What is known besides the scans, kind by kind.
 #[derive(FromPyObject)]
@@ -252,13 +287,16 @@ impl RawKnown {
         let sight = self
             .sight
             .iter()
-            .map(|(lidar, target, centre_m, across, along)| {
+            .map(|(lidar, target, (centre_m, lean, sigma_m, shares))| {
                 Known::Sight(Sight {
                     lidar: *lidar,
                     target: *target,
-                    centre_m: Vector3::from(*centre_m),
-                    across_u_m: *across,
-                    along_u_m: *along,
+                    seen: Sheet {
+                        centre_m: Vector3::from(*centre_m),
+                        lean: *lean,
+                        sigma_m: *sigma_m,
+                        shares: shares.clone(),
+                    },
                 })
             });
         let survey = control.chain(position).chain(mounting).chain(gravity);
@@ -294,7 +332,7 @@ fn adjust_network<'py>(
     arrays::expect_rows("lidars", lidars.len(), holds.len())?;
     let network = Network {
         start: State {
-            lidars: lidars.iter().map(lidar).collect(),
+            lidars: lidars.iter().map(|raw| lidar(raw, targets.len())).collect(),
             surfaces: surfaces.iter().map(surface).collect(),
             targets: targets.iter().map(as_target).collect(),
         },
@@ -312,7 +350,7 @@ fn adjust_network<'py>(
     Ok(described(py, &adjusted, &known.kinds())?)
 }
 
-fn lidar(raw: &RawLidar) -> LidarState {
+fn lidar(raw: &RawLidar, targets: usize) -> LidarState {
     LidarState {
         rotation: rotation(&raw.rotation),
         position_m: Vector3::from(raw.position_m),
@@ -320,6 +358,7 @@ fn lidar(raw: &RawLidar) -> LidarState {
         scale: 0.0,
         offsets_m: vec![0.0; raw.channels],
         retro_m: 0.0,
+        skins_m: vec![0.0; targets],
         slant_m: 0.0,
     }
 }

@@ -139,6 +139,7 @@ struct LidarIn {
     clock_locked: bool,
     channel_offset_m: f64,
     unit_offset_m: f64,
+    elevation_u_rad: f64,
     kick: Option<KickIn>,
     silent_s: Vec<[f64; 2]>,
 }
@@ -323,6 +324,7 @@ impl LidarIn {
             },
             channel_offset_m: self.channel_offset_m,
             unit_offset_m: self.unit_offset_m,
+            elevation_u_rad: self.elevation_u_rad,
             kick: self.kick.map(Kick::from),
             silent_s: self.silent_s,
         })
