@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from rounds import Row
 
-JOBS = ("decode", "ouster", "cluster", "ground", "compressed", "yard", "program")
+JOBS = ("decode", "rotating", "cluster", "ground", "compressed", "yard", "program")
 
 
 def main() -> None:

@@ -30,6 +30,11 @@ pub struct Rows<'a> {
     posed: Posed,
     sums: Sums,
     entries: Vec<(usize, f64)>,
+    /// By lidar: what its clock is behind, nanoseconds, and the noise of its ranges, metres.
+    shifts_ns: Vec<i64>,
+    noise_m: Vec<f64>,
+    /// Whether single echoes are wanted; nobody asks a stretch before its last step.
+    keeps: bool,
     tally: Tally,
 }
 
@@ -52,6 +57,16 @@ impl<'a> Rows<'a> {
                 &adjustment.free,
             ),
             entries: Vec::new(),
+            shifts_ns: (0..lidars.len())
+                .map(|lidar| (adjustment.clock_s(lidar) * 1e9).round() as i64)
+                .collect(),
+            noise_m: adjustment
+                .weights
+                .noise_m
+                .iter()
+                .map(|noise_m| noise_m.hypot(gates.coarse_m()[0]))
+                .collect(),
+            keeps: gates.is_fine() || !adjustment.follows_load,
             tally: Tally::default(),
             adjustment,
         }
@@ -62,6 +77,9 @@ impl<'a> Rows<'a> {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
         let most = self.adjustment.weights.echoes;
         let stride = seen.echoes.len().div_ceil(most).max(1);
+        if self.keeps {
+            self.tally.used.reserve(seen.echoes.len() / stride + 1);
+        }
         let mut hint = None;
         for echo in seen.echoes.iter().step_by(stride) {
             hint = self.add_echo(echo, hint);
@@ -108,8 +126,9 @@ impl<'a> Rows<'a> {
         let misread_m = self.misread_m(echo.lidar, hit.cosine);
         let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - misread_m;
         let weights = &self.adjustment.weights;
-        let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
-        let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
+        let noise_m = self.noise_m[echo.lidar];
+        let own_m = weights.surface_m / hit.cosine;
+        let sigma = (noise_m * noise_m + own_m * own_m).sqrt();
         let patch = self.patch(&hit.contact, s_m);
         let met = Used {
             time_ns: echo.time_ns,
@@ -123,10 +142,14 @@ impl<'a> Rows<'a> {
             patch,
         };
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
-            self.tally.rejected.push(met);
+            if self.keeps {
+                self.tally.rejected.push(met);
+            }
             return Some(s_m);
         }
-        self.tally.used.push(met);
+        if self.keeps {
+            self.tally.used.push(met);
+        }
         let alone = (hit.cosine / noise_m).powi(2);
         let factor = match weights.common.get(self.hold) {
             Some(common) => common.echo_factor(patch, weights.surface_m, alone),
@@ -139,7 +162,7 @@ impl<'a> Rows<'a> {
 
     /// Instant of a shot by the clock that all lidars share, as thought so far.
     fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
-        stamp_ns + (self.adjustment.clock_s(lidar) * 1e9).round() as i64
+        stamp_ns + self.shifts_ns[lidar]
     }
 
     fn hit(

@@ -1,4 +1,7 @@
-"""Ouster packets to points beside ouster-sdk, on a real capture where there is one."""
+"""Ouster packets to points beside ouster-sdk, on a real capture where there is one.
+
+A file by the name of a package would be imported in its place.
+"""
 
 from __future__ import annotations
 
