@@ -8,8 +8,10 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import sys
 from datetime import date
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -26,6 +28,8 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=JOBS, default=JOBS)
     parser.add_argument("--repeats", type=int, default=5)
     options = parser.parse_args()
+    # Last, for the metadata of the package as it is built there: results say by which version.
+    sys.path.extend(map(str, Path(__file__).parents[2].glob(".venv/lib*/**/site-packages")))
     load = os.getloadavg()[0]
     machine = platform.processor() or platform.machine()
     print(f"{date.today()}, {machine}, {os.cpu_count()} cores, load {load:.1f}")
