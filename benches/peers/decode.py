@@ -118,7 +118,7 @@ def copied(path: Path) -> Callable[[], int]:
     return copy
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     path = captures.single()
     warnings.simplefilter("ignore")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 OURS, PEER = "ours", "Open3D, segment_plane"
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     capture = ld.open(captures.single())
     sweeps = [sweep.xyz for sweep in capture.sweeps(capture.lidars[0])]

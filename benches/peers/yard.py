@@ -73,7 +73,7 @@ def _lines(xyz: NDArray[np.float64], ring: NDArray[Any]) -> list[NDArray[np.floa
     return [xyz[ring == number] for number in np.unique(ring)]
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     folder = captures.yard()
     capture = folder / "capture.pcap"
