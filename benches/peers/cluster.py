@@ -121,7 +121,9 @@ def huge() -> list[Row]:
     found = dbscan(points, RADIUS_M, MIN_POINTS, threads=1)
     both = (between - start, time.perf_counter() - between)
     differ = int(((expected < 0) != (found < 0)).sum())  # clusters have other numbers there
-    print(f"\n{HUGE} points: dbscan {both[0]:.1f} s, {ONE} {both[1]:.1f} s, noise differs: {differ}")
+    print(
+        f"\n{HUGE} points: dbscan {both[0]:.1f} s, {ONE} {both[1]:.1f} s, noise differs: {differ}"
+    )
     asked = f"{ASKED[HUGE]} x dbscan (PyPI)"
     return [Row(f"DBSCAN, {HUGE:.0e} points", asked, f"{both[0] / both[1]:.1f}")]
 

@@ -1,6 +1,7 @@
 """All jobs beside their peers in one run, and the table of what was asked.
 
-PYTHONPATH=python target/peers/bin/python benches/peers/suite.py [--only decode ...] [--repeats 5] [--large]
+PYTHONPATH=python target/peers/bin/python benches/peers/suite.py
+    [--only decode ...] [--repeats 5] [--large]
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=JOBS, default=JOBS)
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument(
-        "--large", action="store_true", help="ten million points (23 GB of memory), 20 GB of capture"
+        "--large",
+        action="store_true",
+        help="ten million points (23 GB of memory), 20 GB of capture",
     )
     options = parser.parse_args()
     # Last, for the metadata of the package as it is built there: results say by which version.

@@ -71,7 +71,15 @@ pub struct Hit {
 impl Instant<'_> {
     /// The section at an arc length.
     pub fn section(&self, mesh: &Mesh, s_m: f64) -> Section {
-        let (node, share) = table::interval(&mesh.s_m, s_m);
+        self.section_at(mesh, table::interval(&mesh.s_m, s_m))
+    }
+
+    /// The same of one that probably lies in the element beyond a node.
+    pub fn section_near(&self, mesh: &Mesh, s_m: f64, node: usize) -> Section {
+        self.section_at(mesh, table::interval_near(&mesh.s_m, s_m, node))
+    }
+
+    fn section_at(&self, mesh: &Mesh, (node, share): (usize, f64)) -> Section {
         let (inner, outer) = (self.turn(node), self.turn(node + 1));
         let (from, to) = (self.place(node), self.place(node + 1));
         // An element is an arc: it stands out beyond its chord.
@@ -130,8 +138,10 @@ impl Instant<'_> {
         start_m: f64,
     ) -> Option<Hit> {
         let (mut s_m, mut last) = (start_m, None);
+        let mut node = table::interval(&mesh.s_m, s_m).0;
         for _ in 0..STEPS {
-            let section = self.section(mesh, s_m);
+            let section = self.section_near(mesh, s_m, node);
+            node = section.node;
             let from = section.turn.tr_mul(&(origin - section.place));
             let way = section.turn.tr_mul(direction);
             let line = Line {
@@ -183,7 +193,9 @@ impl Line<'_> {
     /// The same among those beside a facet that it met a little farther along the span.
     fn cross_near(&self, edge: usize) -> Option<Crossing> {
         let count = self.mesh.outline[self.section.node].len();
-        self.first((edge + count - 1..edge + count + 3).map(|i| i % count))
+        let before = if edge == 0 { count - 1 } else { edge - 1 };
+        let next = after(edge, count);
+        self.first([before, edge, next, after(next, count)].into_iter())
     }
 
     /// First facet that the line meets among those between neighbouring points.
@@ -264,7 +276,8 @@ impl Kernel for Search<'_> {
             before = left >> (block.len() - 1);
             while changes != 0 {
                 let next = first + changes.trailing_zeros() as usize;
-                let crossing = line.first([(next + count - 1) % count, next].into_iter());
+                let last = if next == 0 { count - 1 } else { next - 1 };
+                let crossing = line.first([last, next].into_iter());
                 let is_nearer = |c: &Crossing| best.is_none_or(|b| c.2 < b.2);
                 best = crossing.filter(is_nearer).or(best);
                 changes &= changes - 1;
@@ -274,10 +287,15 @@ impl Kernel for Search<'_> {
     }
 }
 
+/// The point of an outline after another one.
+fn after(point: usize, count: usize) -> usize {
+    if point + 1 == count { 0 } else { point + 1 }
+}
+
 /// Point of the outline at a vertex and a share of the way to the next one.
 fn outline_at(mesh: &Mesh, node: usize, vertex: usize, along: f64) -> [f64; 2] {
     let outline = &mesh.outline[node];
-    let (a, b) = (outline[vertex], outline[(vertex + 1) % outline.len()]);
+    let (a, b) = (outline[vertex], outline[after(vertex, outline.len())]);
     [a[0] + (b[0] - a[0]) * along, a[1] + (b[1] - a[1]) * along]
 }
 
@@ -292,7 +310,7 @@ pub(super) fn local(mesh: &Mesh, section: &Section, vertex: usize, along: f64) -
 pub(super) fn contact(mesh: &Mesh, section: Section, vertex: usize, along: f64) -> Contact {
     let local = local(mesh, &section, vertex, along);
     let count = mesh.outline[0].len();
-    let (x, next) = (&mesh.x_c[section.node], (vertex + 1) % count);
+    let (x, next) = (&mesh.x_c[section.node], after(vertex, count));
     let normal = outward(mesh, &section, vertex, along, &local);
     Contact {
         section,
@@ -338,7 +356,7 @@ fn outward(
         );
         [0, 1].map(|k| a[k] + (b[k] - a[k]) * section.share)
     };
-    let (a, b) = (end(vertex), end((vertex + 1) % count));
+    let (a, b) = (end(vertex), end(after(vertex, count)));
     let facet = Vector3::new(b[0] - a[0], b[1] - a[1], 0.0);
     let slope = span_slope(mesh, section, vertex, along, local);
     // The outline runs round the section in the sense that the hand of the blade gives it.

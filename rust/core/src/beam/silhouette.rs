@@ -4,6 +4,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::mesh::Mesh;
 use super::sight::{Contact, Instant, Section, contact, local, span_slope};
+use super::table;
 use crate::simd::{Kernel, vectorized};
 
 /// Improvements of the arc length at which a scan plane meets the axis: at most so many, ...
@@ -47,9 +48,10 @@ impl Instant<'_> {
     /// The outermost point of the blade in a scan plane, searched from arc length `start_m`.
     pub fn silhouette(&self, mesh: &Mesh, plane: &ScanPlane, start_m: f64) -> Option<Silhouette> {
         let across = plane.ahead.cross(&plane.aside);
-        let mut s_m = start_m;
+        let (mut s_m, mut node) = (start_m, table::interval(&mesh.s_m, start_m).0);
         for _ in 0..STEPS {
-            let section = self.section(mesh, s_m);
+            let section = self.section_near(mesh, s_m, node);
+            node = section.node;
             let off = across.dot(&(section.place - plane.origin));
             let step_m = off / across.dot(&section.turn.column(2));
             s_m -= step_m;
@@ -61,13 +63,13 @@ impl Instant<'_> {
             return None;
         }
         let count = mesh.outline[0].len();
-        let cut = Cut::new(mesh, plane, self.section(mesh, s_m), s_m);
+        let cut = Cut::new(mesh, plane, self.section_near(mesh, s_m, node), s_m);
         let views = vectorized(Views(&cut));
         let widths: Vec<f64> = views.iter().map(View::width).collect();
         let outermost = (0..count).max_by(|a, b| widths[*a].total_cmp(&widths[*b]))?;
         let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
         let refined = near.map(|vertex| {
-            let view = self.refine(mesh, plane, vertex, views[vertex].s_m);
+            let view = self.refine(&cut, plane, vertex, views[vertex].s_m);
             (vertex, view)
         });
         let best = refined
@@ -76,7 +78,7 @@ impl Instant<'_> {
         if !(0.0..=mesh.length_m()).contains(&best.1.s_m) {
             return None;
         }
-        let section = self.section(mesh, best.1.s_m);
+        let section = self.section_near(mesh, best.1.s_m, node);
         let contact = contact(mesh, section, best.0, 0.0);
         let step = if is_seen_ahead(&views, best.0) {
             1
@@ -93,8 +95,9 @@ impl Instant<'_> {
         })
     }
 
-    fn refine(&self, mesh: &Mesh, plane: &ScanPlane, vertex: usize, s_m: f64) -> View {
-        let view = |s_m| Cut::new(mesh, plane, self.section(mesh, s_m), s_m).view(vertex);
+    fn refine(&self, near: &Cut, plane: &ScanPlane, vertex: usize, s_m: f64) -> View {
+        let section = |s_m| self.section_near(near.mesh, s_m, near.section.node);
+        let view = |s_m| Cut::new(near.mesh, plane, section(s_m), s_m).view(vertex);
         view(view(s_m).s_m)
     }
 }

@@ -143,8 +143,10 @@ impl Sums {
     fn add_move(&mut self, column: usize, i: usize, moves: &[f64], others: (&[usize], &[f64])) {
         // The outer node has columns of its own.
         let own = if i < MOVES { 0 } else { MOVES };
-        let mut near = self.near.column_mut(column);
-        (i..BOTH).for_each(|k| near[k - own] += moves[k]);
+        let near = &mut self.near.as_mut_slice()[column * BOTH..][i - own..BOTH];
+        near.iter_mut()
+            .zip(&moves[i..])
+            .for_each(|(sum, product)| *sum += product);
         scatter(&mut self.cross, column, others.0, others.1);
     }
 
