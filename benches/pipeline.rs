@@ -4,7 +4,6 @@
 //! test: 1000 elements a second are real time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use lidar_deflect_core::capture::{DatagramBatch, DatagramReader};
 use lidar_deflect_core::cluster::line::LineParams;
 use lidar_deflect_core::cluster::radius::{Intervals, RadiusModel};
 use lidar_deflect_core::fit::arc::SpanAxis;
@@ -24,12 +23,11 @@ use std::hint::black_box;
 #[path = "edgewise.rs"]
 mod edgewise;
 
-use edgewise::{START, capture, scan};
+use edgewise::{START, by_batches, capture, scan};
 
 const PERIOD_NS: i64 = 100_000_000;
 
 fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<Frame> {
-    let mut datagrams = DatagramReader::new(bytes).unwrap();
     let plan = FramePlan {
         lidars: (0..poses.len()).collect(),
         poses: poses.to_vec(),
@@ -42,15 +40,7 @@ fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<F
         stop: Timestamp(i64::MAX),
     };
     let mut reader = FrameReader::new(report, &plan).unwrap();
-    let mut batch = DatagramBatch::default();
-    while let Some(datagram) = datagrams.next().unwrap() {
-        batch.push(&datagram);
-        if batch.bytes() > 2 << 20 {
-            reader.push(&batch);
-            batch.clear();
-        }
-    }
-    reader.push(&batch);
+    by_batches(bytes, |batch| reader.push(batch));
     reader.finish();
     std::iter::from_fn(|| reader.pop()).collect()
 }

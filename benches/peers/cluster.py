@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,6 +22,8 @@ MIN_POINTS = 4
 ASKED = {10_000: 4, 100_000: 6, 1_000_000: 7, 10_000_000: 8}
 SLOW = 1_000_000
 """From so many points on scikit-learn takes minutes in all, and fewer rounds do."""
+HUGE = 10_000_000
+"""With so many points the best peer alone is there, once."""
 ONE, ALL, PEER = "ours, one thread", "ours, all threads", "scikit-learn"
 
 
@@ -109,7 +112,23 @@ def radius_per_point(count: int, repeats: int) -> list[Row]:
     ]
 
 
-def measure(repeats: int, sizes: tuple[int, ...] = (10_000, 100_000, 1_000_000)) -> list[Row]:
+def huge() -> list[Row]:
+    """Time a cloud that leaves room for few others, without a round before."""
+    points = surface(HUGE)
+    theirs, start = peers(points)["dbscan (PyPI)"], time.perf_counter()
+    expected = theirs()
+    between = time.perf_counter()
+    found = dbscan(points, RADIUS_M, MIN_POINTS, threads=1)
+    both = (between - start, time.perf_counter() - between)
+    differ = int(((expected < 0) != (found < 0)).sum())  # clusters have other numbers there
+    print(
+        f"\n{HUGE} points: dbscan {both[0]:.1f} s, {ONE} {both[1]:.1f} s, noise differs: {differ}"
+    )
+    asked = f"{ASKED[HUGE]} x dbscan (PyPI)"
+    return [Row(f"DBSCAN, {HUGE:.0e} points", asked, f"{both[0] / both[1]:.1f}")]
+
+
+def measure(repeats: int, *, large: bool) -> list[Row]:
     """Print one table per size; return what was asked."""
-    rows = [row for count in sizes for row in one_radius(count, repeats)]
-    return rows + radius_per_point(100_000, repeats)
+    rows = [row for count in (10_000, 100_000, SLOW) for row in one_radius(count, repeats)]
+    return rows + radius_per_point(100_000, repeats) + (huge() if large else [])

@@ -22,7 +22,7 @@ def _job(job: str, path: Path) -> Callable[[], Own]:
     return run
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table per format; return what was asked."""
     plain = captures.repeated(captures.yard() / "capture.pcap", 500_000_000)
     rows = []

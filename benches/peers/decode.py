@@ -28,7 +28,8 @@ ELEVATION_RAD = np.radians(
     [-15.0, 1, -13, 3, -11, 5, -9, 7, -7, 9, -5, 11, -3, 13, -1, 15],
 )
 PACKET_BYTES = 1206
-PYTHON, RUST = "capture.sweeps(), all columns", "the same in Rust, one thread"
+PYTHON, RUST = "capture.sweeps(), all columns", "scan and sweeps in Rust, one thread"
+STREAM, LIMIT = "sweeps in Rust after a look at the head", "memcpy of the file"
 DECODER, NUMPY, NUMBA = "velodyne-decoder, read_pcap", "numpy, positions", "numba, positions"
 
 
@@ -100,9 +101,9 @@ def by_us(path: Path) -> int:
     return sum(len(sweep.xyz) for sweep in capture.sweeps(capture.lidars[0]))
 
 
-def in_rust(path: Path) -> Own:
-    """Scan, then sweeps with all columns, streamed."""
-    seconds, _, points = captures.in_rust("sweeps", path)
+def in_rust(job: str, path: Path) -> Own:
+    """Sweeps with all columns, streamed, after a scan or a look at the head."""
+    seconds, _, points = captures.in_rust(job, path)
     return Own(seconds, points)
 
 
@@ -118,7 +119,7 @@ def copied(path: Path) -> Callable[[], int]:
     return copy
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     path = captures.single()
     warnings.simplefilter("ignore")
@@ -128,21 +129,21 @@ def measure(repeats: int) -> list[Row]:
         NUMPY: lambda: by_numpy(path),
         NUMBA: lambda: by_numba(path),
         PYTHON: lambda: by_us(path),
-        RUST: lambda: in_rust(path),
-        "memcpy of the file": copied(path),
+        RUST: lambda: in_rust("sweeps", path),
+        STREAM: lambda: in_rust("stream", path),
+        LIMIT: copied(path),
     }
     timed = rounds(jobs, repeats)
     print(table(timed, packets, "packets", RUST))
     for name, job in timed.items():
         print(f"  {name}: {job.result}")
+    rates = [path.stat().st_size / timed[name].median_s / 1e6 for name in (STREAM, LIMIT)]
+    print(f"  {rates[0]:.0f} MB/s of capture in Rust, {rates[1]:.0f} MB/s by memcpy")
     return [
-        Row(
-            "VLP-16 capture to sweeps in Rust",
-            f"{asked} x {peer}",
-            f"{ratio(timed, peer, RUST):.1f}",
-        )
+        Row(f"VLP-16, {name}", f"{asked} x {peer}", f"{ratio(timed, peer, name):.1f}")
+        for name in (STREAM, RUST)
         for asked, peer in ((30, DECODER), (2.2, NUMBA))
     ] + [
-        Row("the same through Python", f"{asked} x {peer}", f"{ratio(timed, peer, PYTHON):.1f}")
+        Row("VLP-16 through Python", f"{asked} x {peer}", f"{ratio(timed, peer, PYTHON):.1f}")
         for asked, peer in ((20, DECODER), (5, NUMPY))
     ]

@@ -10,8 +10,9 @@ import open3d
 from rounds import Row, ratio, rounds, table
 
 import lidar_deflect as ld
+from lidar_deflect import scene as scenes
 from lidar_deflect.fitting import fit_plane
-from lidar_deflect.registration import ground_band, ground_points
+from lidar_deflect.registration import UP, ground_band, ground_points
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -19,12 +20,13 @@ if TYPE_CHECKING:
 OURS, PEER = "ours", "Open3D, segment_plane"
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     capture = ld.open(captures.single())
     sweeps = [sweep.xyz for sweep in capture.sweeps(capture.lidars[0])]
     xyz = np.concatenate(sweeps[:40])
-    up = np.array([-1.0, 0.0, 0.0])
+    axes = scenes.demo().lidars[0].axes
+    up = np.array([axis @ UP for axis in (axes.x, axes.y, axes.z)])
     wide = xyz.astype(np.float64)
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(wide))
     jobs: dict[str, Callable[[], Any]] = {

@@ -1,6 +1,7 @@
 """All jobs beside their peers in one run, and the table of what was asked.
 
-PYTHONPATH=python target/peers/bin/python benches/peers/suite.py [--only decode ...] [--repeats 5]
+PYTHONPATH=python target/peers/bin/python benches/peers/suite.py
+    [--only decode ...] [--repeats 5] [--large]
 """
 
 from __future__ import annotations
@@ -8,8 +9,10 @@ from __future__ import annotations
 import argparse
 import os
 import platform
+import sys
 from datetime import date
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -17,7 +20,7 @@ if TYPE_CHECKING:
 
     from rounds import Row
 
-JOBS = ("decode", "ouster", "cluster", "ground", "compressed", "yard", "program")
+JOBS = ("decode", "rotating", "cluster", "ground", "compressed", "yard", "program")
 
 
 def main() -> None:
@@ -25,7 +28,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="+", choices=JOBS, default=JOBS)
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument(
+        "--large",
+        action="store_true",
+        help="ten million points (23 GB of memory), 20 GB of capture",
+    )
     options = parser.parse_args()
+    # Last, for the metadata of the package as it is built there: results say by which version.
+    sys.path.extend(map(str, Path(__file__).parents[2].glob(".venv/lib*/**/site-packages")))
     load = os.getloadavg()[0]
     machine = platform.processor() or platform.machine()
     print(f"{date.today()}, {machine}, {os.cpu_count()} cores, load {load:.1f}")
@@ -33,7 +43,7 @@ def main() -> None:
     for name in options.only:
         print(f"\n== {name}")
         try:
-            rows += import_module(name).measure(options.repeats)
+            rows += import_module(name).measure(options.repeats, large=options.large)
         except ImportError as missing:
             print(f"left out: {missing}")
     print("\n" + summary(rows))

@@ -34,7 +34,7 @@ def script(path: Path, poses: dict[str, NDArray[np.float64]]) -> int:
             velodyne_decoder.Config(model=velodyne_decoder.Model.VLP16)
         )
         for time_s, payload in _packets(path, address):
-            scan = decoder.decode(time_s, payload)
+            scan = decoder.decode(time_s, payload, as_pcl_structs=True)
             if scan is not None:
                 curves += _frame(scan[1], pose)
     return curves
@@ -73,7 +73,7 @@ def _lines(xyz: NDArray[np.float64], ring: NDArray[Any]) -> list[NDArray[np.floa
     return [xyz[ring == number] for number in np.unique(ring)]
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     folder = captures.yard()
     capture = folder / "capture.pcap"

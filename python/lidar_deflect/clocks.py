@@ -7,6 +7,7 @@ by which its readings are best explained by the measured deflection.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -125,6 +126,14 @@ class _Pair:
         quarters = [_QUARTER_S * k for k in range(-_MOST_QUARTERS, _MOST_QUARTERS + 1)]
         return [0.0, *(each for each in quarters if self._overlap(each) >= _SHARE)]
 
+    @cached_property
+    def _reach(self) -> float:
+        return float(np.ptp(self.d))
+
+    @cached_property
+    def _spread(self) -> float:
+        return float(np.var(self.channel))
+
     def _overlap(self, shift_s: float) -> float:
         """Share of the shorter record that lies within the other."""
         low = max(self.t[0], self.channel_t[0] + shift_s)
@@ -135,12 +144,16 @@ class _Pair:
     def _fit(self, shift_s: float) -> tuple[float, float, Floats] | None:
         """Mean square that a parabola in the deflection leaves, its share, and the residuals."""
         at = self.t - shift_s
-        inside = (at >= self.channel_t[0]) & (at <= self.channel_t[-1])
-        if inside.sum() < max(_FEWEST, _SHARE * self.t.size):
+        first = np.searchsorted(at, self.channel_t[0])
+        last = np.searchsorted(at, self.channel_t[-1], side="right")
+        if last - first < max(_FEWEST, _SHARE * self.t.size):
             return None
-        y, d = np.interp(at[inside], self.channel_t, self.channel), self.d[inside]
+        d = self.d[first:last]
+        if d.max() - d.min() < 0.3 * self._reach:
+            return None
+        y = np.interp(at[first:last], self.channel_t, self.channel)
         spread = float(np.var(y))
-        if spread <= 0.2 * float(np.var(self.channel)) or np.ptp(d) < 0.3 * np.ptp(self.d):
+        if spread <= 0.2 * self._spread:
             return None
         terms = np.column_stack([np.ones_like(d), d, d * d])
         solution = np.linalg.lstsq(terms, y, rcond=None)[0]

@@ -97,8 +97,8 @@ def ground_band(xyz: NDArray[np.float32], up_in_sensor: NDArray[np.float64]) -> 
     up_in_sensor
         World up in the sensor frame as the mounting puts it, shape (3,).
     """
-    range_m = np.linalg.norm(xyz, axis=1)
-    overhead = range_m[xyz @ up_in_sensor > GROUND_DIP * range_m]
+    range_m, height_m = _range_and_height(xyz, up_in_sensor)
+    overhead = range_m[height_m > GROUND_DIP * range_m]
     nearest = float(overhead.min()) if overhead.size else GROUND_RANGE_MAX_M
     return 0.0, min(GROUND_MARGIN * nearest, GROUND_RANGE_MAX_M)
 
@@ -109,10 +109,22 @@ def ground_points(
     range_m: tuple[float, float],
 ) -> NDArray[np.float32]:
     """Points below the horizon within a range band (step 2), shape (m, 3), sensor frame."""
-    distance = np.linalg.norm(xyz, axis=1)
+    distance, height_m = _range_and_height(xyz, up_in_sensor)
     in_band = (distance >= range_m[0]) & (distance <= range_m[1])
-    below = xyz @ up_in_sensor < -GROUND_DIP * distance
-    return np.asarray(xyz[in_band & below])
+    below = height_m < -GROUND_DIP * distance
+    return np.asarray(xyz.take(np.flatnonzero(in_band & below), axis=0))
+
+
+def _range_and_height(
+    xyz: NDArray[np.float32], up_in_sensor: NDArray[np.float64]
+) -> tuple[NDArray[np.float32], NDArray[np.float64]]:
+    """Distance from the sensor and height above it, metres, shape (n,) each.
+
+    Column by column: a hold has millions of points, and rows of three are slow in numpy.
+    """
+    x, y, z = xyz.T
+    height_m = x * up_in_sensor[0] + y * up_in_sensor[1] + z * up_in_sensor[2]
+    return np.sqrt(x * x + y * y + z * z), height_m
 
 
 def rotation_onto(

@@ -1,7 +1,7 @@
 //! How fast does a capture go through each stage? For `benches/peers`, which runs it beside other programs.
 //!
 //! `cargo run --release --example throughput -- JOB CAPTURE`, JOB one of `bytes` (read and decompress alone), `datagrams`,
-//! `scan` and `sweeps` (with the scan before it): prints seconds, datagrams and points.
+//! `scan`, `sweeps` (with the scan before it) and `stream` (with a look at the head instead): prints seconds, datagrams and points.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
@@ -10,6 +10,9 @@ use std::time::Instant;
 
 use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, SweepOptions, SweepReader};
 use lidar_deflect_files::CaptureSet;
+
+/// Datagrams of a look at the head: two seconds of a small lidar.
+const HEAD: u64 = 1500;
 
 type Outcome = Result<(u64, u64), Box<dyn std::error::Error>>;
 
@@ -21,9 +24,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (count, points) = match job.as_str() {
         "bytes" => bytes(&paths[0])?,
         "datagrams" => datagrams(&paths)?,
-        "scan" => (scan(&paths)?.datagrams, 0),
-        "sweeps" => sweeps(&paths)?,
-        _ => return Err("JOB is bytes, datagrams, scan or sweeps".into()),
+        "scan" => (scan(&paths, u64::MAX)?.datagrams, 0),
+        "sweeps" => sweeps(&paths, u64::MAX)?,
+        "stream" => sweeps(&paths, HEAD)?,
+        _ => return Err("JOB is bytes, datagrams, scan, sweeps or stream".into()),
     };
     println!("{} {count} {points}", begun.elapsed().as_secs_f64());
     Ok(())
@@ -54,16 +58,21 @@ fn datagrams(paths: &[PathBuf]) -> Outcome {
     Ok((count, 0))
 }
 
-fn scan(paths: &[PathBuf]) -> Result<ScanReport, Box<dyn std::error::Error>> {
+/// The first so many datagrams at most.
+fn scan(paths: &[PathBuf], most: u64) -> Result<ScanReport, Box<dyn std::error::Error>> {
     let (mut set, mut scan) = (CaptureSet::open(paths)?, Scan::new(ScanOptions::default()));
-    while let Some(datagram) = set.next()? {
+    let mut count = 0;
+    while count < most
+        && let Some(datagram) = set.next()?
+    {
         scan.push(&datagram);
+        count += 1;
     }
     Ok(scan.finish())
 }
 
-fn sweeps(paths: &[PathBuf]) -> Outcome {
-    let report = scan(paths)?;
+fn sweeps(paths: &[PathBuf], head: u64) -> Outcome {
+    let report = scan(paths, head)?;
     let mut reader = SweepReader::new(&report, &SweepOptions::default())?;
     let (mut set, mut count, mut points) = (CaptureSet::open(paths)?, 0, 0);
     while let Some(datagram) = set.next()? {

@@ -60,7 +60,8 @@ pub fn compute_until<T: Send>(
     interruptible(py, |stop| pool.install(|| work(stop)))
 }
 
-fn pool_of(threads: Option<usize>) -> BorderResult<ThreadPool> {
+/// Threads for `compute`'s work, for who has much of it in small parts.
+pub fn pool_of(threads: Option<usize>) -> BorderResult<ThreadPool> {
     let pool = ThreadPoolBuilder::new()
         .num_threads(checked_threads(threads)?)
         .build();

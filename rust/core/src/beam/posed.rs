@@ -172,7 +172,10 @@ fn project<'a>(
     let outer = &moves[(section.node + 1) * count..][..count];
     let slopes = node_slopes(section, along, about);
     inner.iter().zip(outer).map(move |(a, b)| {
-        let moves = a.iter().chain(b);
-        moves.zip(&slopes).map(|(part, slope)| part * slope).sum()
+        // In the order of the moves, one after the other.
+        let (first, second) = slopes.split_at(MOVES);
+        let add = |sum: f64, (part, slope): (&f64, &f64)| sum + part * slope;
+        let inner = a.iter().zip(first).fold(0.0, add);
+        b.iter().zip(second).fold(inner, add)
     })
 }

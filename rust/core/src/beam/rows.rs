@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M};
 use super::common;
 use super::echoes::{Echo, Edge};
-use super::layout::RIG;
+use super::layout::{Layout, RANGES, RIG};
 use super::posed::{Posed, node_slopes};
 use super::rig::Lidar;
 use super::sight::{Contact, Hit};
@@ -21,6 +21,34 @@ const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
 /// The same of edges beside facets seen at a grazing angle over so much, metres across: they are soft.
 const SOFT_M: (f64, f64) = (0.008, 0.016);
 
+/// Where unknowns stand that every row asks for: sums over holds and lidars, made once.
+struct Places {
+    sway: usize,
+    clock: usize,
+    /// By lidar.
+    lidars: Vec<usize>,
+    shape: usize,
+    edge: usize,
+    ranges: usize,
+    len: usize,
+}
+
+impl Places {
+    fn of(layout: &Layout, hold: usize) -> Self {
+        Self {
+            sway: layout.sway_at(hold),
+            clock: layout.clock_at(0),
+            lidars: (0..layout.channels.len())
+                .map(|lidar| layout.lidar_at(lidar))
+                .collect(),
+            shape: layout.shape_at(),
+            edge: layout.edge_at(),
+            ranges: layout.range_at(0),
+            len: layout.len(),
+        }
+    }
+}
+
 /// Makes the rows of one hold.
 pub struct Rows<'a> {
     pub(super) adjustment: &'a Adjustment,
@@ -30,6 +58,12 @@ pub struct Rows<'a> {
     pub(super) posed: Posed,
     sums: Sums,
     entries: Vec<(usize, f64)>,
+    places: Places,
+    /// By lidar: what its clock is behind, nanoseconds, and the noise of its ranges, metres.
+    shifts_ns: Vec<i64>,
+    noise_m: Vec<f64>,
+    /// Whether single echoes are wanted; nobody asks a stretch before its last step.
+    keeps: bool,
     pub(super) tally: Tally,
 }
 
@@ -52,6 +86,17 @@ impl<'a> Rows<'a> {
                 &adjustment.free,
             ),
             entries: Vec::new(),
+            places: Places::of(&adjustment.layout, hold),
+            shifts_ns: (0..lidars.len())
+                .map(|lidar| (adjustment.clock_s(lidar) * 1e9).round() as i64)
+                .collect(),
+            noise_m: adjustment
+                .weights
+                .noise_m
+                .iter()
+                .map(|noise_m| noise_m.hypot(gates.coarse_m()[0]))
+                .collect(),
+            keeps: gates.is_fine() || !adjustment.follows_load,
             tally: Tally::default(),
             adjustment,
         }
@@ -63,9 +108,13 @@ impl<'a> Rows<'a> {
             return self.collect_near();
         }
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let stride = seen.echoes.len().div_ceil(self.adjustment.weights.echoes);
+        let most = self.adjustment.weights.echoes;
+        let stride = seen.echoes.len().div_ceil(most).max(1);
+        if self.keeps {
+            self.tally.used.reserve(seen.echoes.len() / stride + 1);
+        }
         let mut hint = None;
-        for echo in seen.echoes.iter().step_by(stride.max(1)) {
+        for echo in seen.echoes.iter().step_by(stride) {
             hint = self.add_echo(echo, hint);
         }
         for edge in &seen.edges {
@@ -110,15 +159,20 @@ impl<'a> Rows<'a> {
         let misread_m = self.misread_m(echo.lidar, hit.cosine);
         let residual = echo.range_m - lidar.reported_m(hit.range_m, echo.ring) - misread_m;
         let weights = &self.adjustment.weights;
-        let noise_m = weights.noise_m[echo.lidar].hypot(self.gates.coarse_m()[0]);
-        let sigma = noise_m.hypot(weights.surface_m / hit.cosine);
+        let noise_m = self.noise_m[echo.lidar];
+        let own_m = weights.surface_m / hit.cosine;
+        let sigma = (noise_m * noise_m + own_m * own_m).sqrt();
         let point = lidar.origin + direction * (hit.range_m + residual);
         let met = self.met(echo, &hit.contact, residual, point, hit.cosine);
         if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
-            self.tally.rejected.push(met);
+            if self.keeps {
+                self.tally.rejected.push(met);
+            }
             return Some(s_m);
         }
-        self.tally.used.push(met);
+        if self.keeps {
+            self.tally.used.push(met);
+        }
         let alone = (hit.cosine / noise_m).powi(2);
         let factor = match weights.common.get(self.hold) {
             Some(common) => common.echo_factor(met.patch, weights.surface_m, alone),
@@ -154,7 +208,7 @@ impl<'a> Rows<'a> {
 
     /// Instant of a shot by the clock that all lidars share, as thought so far.
     pub(super) fn time_ns(&self, lidar: usize, stamp_ns: i64) -> i64 {
-        stamp_ns + (self.adjustment.clock_s(lidar) * 1e9).round() as i64
+        stamp_ns + self.shifts_ns[lidar]
     }
 
     fn hit(
@@ -194,7 +248,7 @@ impl<'a> Rows<'a> {
 
     /// What errors of range add to the prediction.
     fn misread_m(&self, lidar: usize, cosine: f64) -> f64 {
-        let first = self.adjustment.layout.range_at(lidar);
+        let first = self.places.ranges + RANGES * lidar;
         let values = &self.adjustment.values;
         let slopes = range_slopes_m(cosine);
         slopes[0] * values[first] + slopes[1] * values[first + 1]
@@ -204,12 +258,12 @@ impl<'a> Rows<'a> {
         let along = -hit.contact.normal / hit.cosine;
         let moves = self.fill_row(&hit.contact, &along, echo.lidar, time_ns);
         let layout = &self.adjustment.layout;
-        let first = layout.lidar_at(echo.lidar);
+        let first = self.places.lidars[echo.lidar];
         self.entries.push((first + 7, -hit.range_m));
         if echo.ring < layout.channels[echo.lidar] {
             self.entries.push((first + RIG + echo.ring, -1.0));
         }
-        let ranges = layout.range_at(echo.lidar);
+        let ranges = self.places.ranges + RANGES * echo.lidar;
         let slopes = range_slopes_m(hit.cosine);
         self.entries
             .extend([(ranges, slopes[0]), (ranges + 1, slopes[1])]);
@@ -248,7 +302,7 @@ impl<'a> Rows<'a> {
         let (knot, weights) = self.posed.beat(time_ns);
         let sway = self.posed.sway_slopes(&contact.section, along, &about);
         for (mode, slope) in sway.enumerate() {
-            let first = layout.sway_at(self.hold) + mode * layout.knots[self.hold] + knot;
+            let first = self.places.sway + mode * layout.knots[self.hold] + knot;
             let parts = weights.iter().enumerate();
             row.extend(
                 parts
@@ -257,16 +311,22 @@ impl<'a> Rows<'a> {
         }
         let velocity_m_s = self.posed.velocity_m_s(contact, time_ns);
         let clock_s = self.adjustment.rig.clock_s[lidar];
-        row.push((layout.clock_at(lidar), along.dot(&velocity_m_s) * clock_s));
-        if self.adjustment.free.end > layout.lidar_at(0) {
-            let (mesh, first) = (&problem.mesh, layout.shape_at());
+        row.push((
+            self.places.clock + lidar,
+            along.dot(&velocity_m_s) * clock_s,
+        ));
+        if self.adjustment.free.end > self.places.lidars[0] {
+            let (mesh, first) = (&problem.mesh, self.places.shape);
             problem.shape.slopes(mesh, contact, along, first, row);
             problem.shape.waves(mesh, contact, along, first, row);
-            self.lidars[lidar].slopes(contact, along, layout.lidar_at(lidar), row);
+            self.lidars[lidar].slopes(contact, along, self.places.lidars[lidar], row);
         }
-        if self.adjustment.free.end > layout.len() {
+        if self.adjustment.free.end > self.places.len {
             // A strain is fitted as a check: everything moves away from the root.
-            row.push((layout.len() + self.hold, along.dot(&contact.section.place)));
+            row.push((
+                self.places.len + self.hold,
+                along.dot(&contact.section.place),
+            ));
         }
         node_slopes(&contact.section, along, &about)
     }
@@ -309,7 +369,7 @@ impl<'a> Rows<'a> {
         let side = side_of(silhouette.contact.x_c);
         let at = layout.edge_offset_at(self.hold, edge.lidar, side);
         let values = &self.adjustment.values;
-        let outside = values[layout.edge_at()] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
+        let outside = values[self.places.edge] * EDGE_RAD + values[at] * EDGE_OFFSET_RAD;
         if self.adjustment.muted.contains(&(edge.lidar, side)) {
             self.tally.edges_left_out[2] += 1;
             return;
@@ -339,7 +399,7 @@ impl<'a> Rows<'a> {
             step_rad,
         });
         let weight = robust(residual, sigma, gate_rad) / variance;
-        let edge_at = layout.edge_at();
+        let edge_at = self.places.edge;
         let along = across(plane, silhouette);
         let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
         self.entries

@@ -122,11 +122,11 @@ impl Shape {
         let outward = self.waves_m(mesh, contact.section.node) * along.dot(&contact.normal);
         let side = usize::from(mesh.is_second_side(contact.vertex));
         let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;
+        let heights = heights(contact.x_c);
         for (knot, weight) in hats(self.arc_m(mesh, contact) - self.from_m, KNOT_M, self.knots) {
-            for wave in 0..CHORD_WAVES {
-                let height = height(wave, contact.x_c);
-                out.push((first + knot * CHORD_WAVES + wave, outward * weight * height));
-            }
+            let place = first + knot * CHORD_WAVES;
+            let waves = heights.iter().enumerate();
+            out.extend(waves.map(|(wave, height)| (place + wave, outward * weight * height)));
         }
     }
 
@@ -141,11 +141,18 @@ impl Shape {
     }
 }
 
-/// Height of a wave at a place along the chord: none at both edges, which chord and axis place.
-fn height(wave: usize, x_c: f64) -> f64 {
+/// Heights of the waves at a place along the chord: none at both edges, which chord and axis place.
+fn heights(x_c: f64) -> [f64; CHORD_WAVES] {
     let nose = (x_c / NEAR_EDGE).clamp(0.0, 1.0).sqrt();
     let tail = ((1.0 - x_c) / NEAR_EDGE).clamp(0.0, 1.0);
-    nose * tail * (PI * wave as f64 * x_c).cos()
+    // cos(k t) by the two before it.
+    let turn = (PI * x_c).cos();
+    let (mut last, mut now) = (turn, 1.0);
+    std::array::from_fn(|_| {
+        let height = nose * tail * now;
+        (last, now) = (now, 2.0 * turn * now - last);
+        height
+    })
 }
 
 /// Two hat functions that are not zero at `x`, and their values; constant beyond the ends.

@@ -5,11 +5,14 @@ use nalgebra::{Matrix3, Vector3};
 use super::axis::Axis;
 use super::mesh::Mesh;
 use super::table;
+use crate::simd::{Kernel, vectorized};
 
 /// Improvements of the arc length at which a ray meets the blade.
 const STEPS: usize = 6;
 /// The hit lies in the plane of its section to this, metres.
 const CONVERGED_M: f64 = 1e-5;
+/// Points of the outline that are held against a line at once.
+const LANES: usize = 16;
 
 /// Two states between which the blade is, and the share of the way.
 #[derive(Debug, Clone, Copy)]
@@ -68,7 +71,15 @@ pub struct Hit {
 impl Instant<'_> {
     /// The section at an arc length.
     pub fn section(&self, mesh: &Mesh, s_m: f64) -> Section {
-        let (node, share) = table::interval(&mesh.s_m, s_m);
+        self.section_at(mesh, table::interval(&mesh.s_m, s_m))
+    }
+
+    /// The same of one that probably lies in the element beyond a node.
+    pub fn section_near(&self, mesh: &Mesh, s_m: f64, node: usize) -> Section {
+        self.section_at(mesh, table::interval_near(&mesh.s_m, s_m, node))
+    }
+
+    fn section_at(&self, mesh: &Mesh, (node, share): (usize, f64)) -> Section {
         let (inner, outer) = (self.turn(node), self.turn(node + 1));
         let (from, to) = (self.place(node), self.place(node + 1));
         // An element is an arc: it stands out beyond its chord.
@@ -127,8 +138,10 @@ impl Instant<'_> {
         start_m: f64,
     ) -> Option<Hit> {
         let (mut s_m, mut last) = (start_m, None);
+        let mut node = table::interval(&mesh.s_m, s_m).0;
         for _ in 0..STEPS {
-            let section = self.section(mesh, s_m);
+            let section = self.section_near(mesh, s_m, node);
+            node = section.node;
             let from = section.turn.tr_mul(&(origin - section.place));
             let way = section.turn.tr_mul(direction);
             let line = Line {
@@ -174,26 +187,26 @@ type Crossing = (usize, f64, f64);
 impl Line<'_> {
     /// First facet of the outline that the line meets.
     fn cross(&self) -> Option<Crossing> {
-        let count = self.mesh.outline[self.section.node].len();
-        self.first((count - 1..count).chain(0..count))
+        vectorized(Search(self))
     }
 
     /// The same among those beside a facet that it met a little farther along the span.
     fn cross_near(&self, edge: usize) -> Option<Crossing> {
         let count = self.mesh.outline[self.section.node].len();
-        self.first((edge + count - 1..edge + count + 3).map(|i| i % count))
+        let before = if edge == 0 { count - 1 } else { edge - 1 };
+        let next = after(edge, count);
+        self.first([before, edge, next, after(next, count)].into_iter())
     }
 
     /// First facet that the line meets among those between neighbouring points.
     fn first(&self, points: impl Iterator<Item = usize>) -> Option<Crossing> {
         let way = self.way;
-        let side = |p: (f64, f64)| way.x * p.1 - way.y * p.0;
         let mut points = points.map(|i| (i, self.at(i)));
         let (mut index, mut last) = points.next()?;
-        let mut last_side = side(last);
+        let mut last_side = self.side(last);
         let mut best: Option<Crossing> = None;
         for (next, point) in points {
-            let this_side = side(point);
+            let this_side = self.side(point);
             if (last_side > 0.0) != (this_side > 0.0) {
                 let along = last_side / (last_side - this_side);
                 let x = last.0 + (point.0 - last.0) * along;
@@ -211,19 +224,78 @@ impl Line<'_> {
     /// A point of the outline from the start of the line.
     fn at(&self, i: usize) -> (f64, f64) {
         let node = self.section.node;
-        let (a, b) = (self.mesh.outline[node][i], self.mesh.outline[node + 1][i]);
+        self.between(&self.mesh.outline[node][i], &self.mesh.outline[node + 1][i])
+    }
+
+    /// The same by that point at both nodes.
+    #[inline(always)]
+    fn between(&self, a: &[f64; 2], b: &[f64; 2]) -> (f64, f64) {
         let share = self.section.share;
         (
             a[0] + (b[0] - a[0]) * share - self.from.x,
             a[1] + (b[1] - a[1]) * share - self.from.y,
         )
     }
+
+    /// On which side of the line a point lies.
+    #[inline(always)]
+    fn side(&self, point: (f64, f64)) -> f64 {
+        self.way.x * point.1 - self.way.y * point.0
+    }
+
+    /// Whether points, at most [`LANES`], given at both nodes, lie left of the line: a bit each.
+    #[inline(always)]
+    fn lies_left(&self, inner: &[[f64; 2]], outer: &[[f64; 2]]) -> u32 {
+        let mut sides = [0.0; LANES];
+        for ((side, a), b) in sides.iter_mut().zip(inner).zip(outer) {
+            *side = self.side(self.between(a, b));
+        }
+        let bits = sides.iter().enumerate();
+        bits.fold(0, |left, (i, side)| left | u32::from(*side > 0.0) << i)
+    }
+}
+
+/// Looks for the first facet among all of them.
+struct Search<'a>(&'a Line<'a>);
+
+impl Kernel for Search<'_> {
+    type Out = Option<Crossing>;
+
+    #[inline(always)]
+    fn run(self) -> Self::Out {
+        let Self(line) = self;
+        let node = line.section.node;
+        let (inner, outer) = (&line.mesh.outline[node], &line.mesh.outline[node + 1]);
+        let count = inner.len();
+        let mut best: Option<Crossing> = None;
+        let mut before = line.lies_left(&inner[count - 1..], &outer[count - 1..]);
+        for first in (0..count).step_by(LANES) {
+            let block = first..count.min(first + LANES);
+            let left = line.lies_left(&inner[block.clone()], &outer[block.clone()]);
+            let mut changes = (left ^ (left << 1 | before)) & ((1 << block.len()) - 1);
+            before = left >> (block.len() - 1);
+            while changes != 0 {
+                let next = first + changes.trailing_zeros() as usize;
+                let last = if next == 0 { count - 1 } else { next - 1 };
+                let crossing = line.first([last, next].into_iter());
+                let is_nearer = |c: &Crossing| best.is_none_or(|b| c.2 < b.2);
+                best = crossing.filter(is_nearer).or(best);
+                changes &= changes - 1;
+            }
+        }
+        best
+    }
+}
+
+/// The point of an outline after another one.
+fn after(point: usize, count: usize) -> usize {
+    if point + 1 == count { 0 } else { point + 1 }
 }
 
 /// Point of the outline at a vertex and a share of the way to the next one.
 fn outline_at(mesh: &Mesh, node: usize, vertex: usize, along: f64) -> [f64; 2] {
     let outline = &mesh.outline[node];
-    let (a, b) = (outline[vertex], outline[(vertex + 1) % outline.len()]);
+    let (a, b) = (outline[vertex], outline[after(vertex, outline.len())]);
     [a[0] + (b[0] - a[0]) * along, a[1] + (b[1] - a[1]) * along]
 }
 
@@ -238,7 +310,7 @@ pub(super) fn local(mesh: &Mesh, section: &Section, vertex: usize, along: f64) -
 pub(super) fn contact(mesh: &Mesh, section: Section, vertex: usize, along: f64) -> Contact {
     let local = local(mesh, &section, vertex, along);
     let count = mesh.outline[0].len();
-    let (x, next) = (&mesh.x_c[section.node], (vertex + 1) % count);
+    let (x, next) = (&mesh.x_c[section.node], after(vertex, count));
     let normal = outward(mesh, &section, vertex, along, &local);
     Contact {
         section,
@@ -284,7 +356,7 @@ fn outward(
         );
         [0, 1].map(|k| a[k] + (b[k] - a[k]) * section.share)
     };
-    let (a, b) = (end(vertex), end((vertex + 1) % count));
+    let (a, b) = (end(vertex), end(after(vertex, count)));
     let facet = Vector3::new(b[0] - a[0], b[1] - a[1], 0.0);
     let slope = span_slope(mesh, section, vertex, along, local);
     // The outline runs round the section in the sense that the hand of the blade gives it.

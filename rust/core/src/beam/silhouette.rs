@@ -4,9 +4,15 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::mesh::Mesh;
 use super::sight::{Contact, Instant, Section, contact, local, span_slope};
+use super::table;
+use crate::simd::{Kernel, vectorized};
 
-/// Improvements of the arc length at which a scan plane meets the axis.
+/// Improvements of the arc length at which a scan plane meets the axis: at most so many, ...
 const STEPS: usize = 6;
+/// ... as none that is smaller moves the silhouette, which is improved by itself, metres.
+const SMALLEST_M: f64 = 1e-10;
+/// Points of the outline that are seen at once.
+const LANES: usize = 8;
 /// Facets seen at a flatter angle than this lose their echoes, cosine of incidence.
 const GRAZING_COSINE: f64 = 0.17;
 
@@ -42,23 +48,28 @@ impl Instant<'_> {
     /// The outermost point of the blade in a scan plane, searched from arc length `start_m`.
     pub fn silhouette(&self, mesh: &Mesh, plane: &ScanPlane, start_m: f64) -> Option<Silhouette> {
         let across = plane.ahead.cross(&plane.aside);
-        let mut s_m = start_m;
+        let (mut s_m, mut node) = (start_m, table::interval(&mesh.s_m, start_m).0);
         for _ in 0..STEPS {
-            let section = self.section(mesh, s_m);
+            let section = self.section_near(mesh, s_m, node);
+            node = section.node;
             let off = across.dot(&(section.place - plane.origin));
-            s_m -= off / across.dot(&section.turn.column(2));
+            let step_m = off / across.dot(&section.turn.column(2));
+            s_m -= step_m;
+            if step_m.abs() < SMALLEST_M {
+                break;
+            }
         }
         if !(0.0..=mesh.length_m()).contains(&s_m) {
             return None;
         }
         let count = mesh.outline[0].len();
-        let cut = Cut::new(mesh, plane, self.section(mesh, s_m), s_m);
-        let views: Vec<View> = (0..count).map(|vertex| cut.view(vertex)).collect();
-        let outermost =
-            (0..count).max_by(|a, b| views[*a].width().total_cmp(&views[*b].width()))?;
+        let cut = Cut::new(mesh, plane, self.section_near(mesh, s_m, node), s_m);
+        let views = vectorized(Views(&cut));
+        let widths: Vec<f64> = views.iter().map(View::width).collect();
+        let outermost = (0..count).max_by(|a, b| widths[*a].total_cmp(&widths[*b]))?;
         let near = [count - 1, 0, 1].map(|step| (outermost + step) % count);
         let refined = near.map(|vertex| {
-            let view = self.refine(mesh, plane, vertex, views[vertex].s_m);
+            let view = self.refine(&cut, plane, vertex, views[vertex].s_m);
             (vertex, view)
         });
         let best = refined
@@ -67,7 +78,7 @@ impl Instant<'_> {
         if !(0.0..=mesh.length_m()).contains(&best.1.s_m) {
             return None;
         }
-        let section = self.section(mesh, best.1.s_m);
+        let section = self.section_near(mesh, best.1.s_m, node);
         let contact = contact(mesh, section, best.0, 0.0);
         let step = if is_seen_ahead(&views, best.0) {
             1
@@ -84,8 +95,9 @@ impl Instant<'_> {
         })
     }
 
-    fn refine(&self, mesh: &Mesh, plane: &ScanPlane, vertex: usize, s_m: f64) -> View {
-        let view = |s_m| Cut::new(mesh, plane, self.section(mesh, s_m), s_m).view(vertex);
+    fn refine(&self, near: &Cut, plane: &ScanPlane, vertex: usize, s_m: f64) -> View {
+        let section = |s_m| self.section_near(near.mesh, s_m, near.section.node);
+        let view = |s_m| Cut::new(near.mesh, plane, section(s_m), s_m).view(vertex);
         view(view(s_m).s_m)
     }
 }
@@ -125,6 +137,57 @@ impl<'a> Cut<'a> {
             ahead_m: point.y + slope.y * step,
             aside_m: point.z + slope.z * step,
         }
+    }
+}
+
+/// Looks at all points of the outline.
+struct Views<'a>(&'a Cut<'a>);
+
+impl Kernel for Views<'_> {
+    type Out = Vec<View>;
+
+    #[inline(always)]
+    fn run(self) -> Vec<View> {
+        let Self(cut) = self;
+        let node = cut.section.node;
+        let (inner, outer) = (&cut.mesh.outline[node], &cut.mesh.outline[node + 1]);
+        let mut views = Vec::with_capacity(inner.len());
+        let mut ends = [[0.0; LANES]; 4];
+        for (a, b) in inner.chunks(LANES).zip(outer.chunks(LANES)) {
+            for (i, (a, b)) in a.iter().zip(b).enumerate() {
+                (ends[0][i], ends[1][i], ends[2][i], ends[3][i]) = (a[0], a[1], b[0], b[1]);
+            }
+            let block = cut.block(&ends).into_iter();
+            views.extend(block.take(a.len()));
+        }
+        views
+    }
+}
+
+impl Cut<'_> {
+    /// The same as [`Cut::view`] of points side by side: x and y at the inner node and at the outer one.
+    #[inline(always)]
+    fn block(&self, ends: &[[f64; LANES]; 4]) -> [View; LANES] {
+        let length = self.mesh.step_m(self.section.node);
+        let (share, axes, bend) = (self.section.share, &self.axes, &self.section.curvature);
+        let mut parts = [[0.0; LANES]; 3];
+        for i in 0..LANES {
+            let (wide, high) = (ends[2][i] - ends[0][i], ends[3][i] - ends[1][i]);
+            let (x, y) = (ends[0][i] + wide * share, ends[1][i] + high * share);
+            let (u, v) = (wide / length - bend.z * y, high / length + bend.z * x);
+            let w = 1.0 + (bend.x * y - bend.y * x);
+            let point = |k: usize| self.place[k] + (axes[(k, 0)] * x + axes[(k, 1)] * y);
+            let slope = |k: usize| axes[(k, 0)] * u + axes[(k, 1)] * v + axes[(k, 2)] * w;
+            let step = -point(0) / slope(0);
+            parts[0][i] = self.s_m + step;
+            parts[1][i] = point(1) + slope(1) * step;
+            parts[2][i] = point(2) + slope(2) * step;
+        }
+        std::array::from_fn(|i| View {
+            s_m: parts[0][i],
+            ahead_m: parts[1][i],
+            aside_m: parts[2][i],
+        })
     }
 }
 

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixView};
 
 use super::panel::Panel;
 
@@ -49,6 +49,8 @@ pub struct Sums {
     /// Others with each other; each product once, on either side of the diagonal.
     own: DMatrix<f64>,
     panel: Panel,
+    /// Nodes whose moves are summed.
+    nodes: Range<usize>,
     touched: Vec<usize>,
     values: Vec<f64>,
     rows: usize,
@@ -83,6 +85,7 @@ impl Sums {
             cross: DMatrix::zeros(size, MOVES * nodes),
             own: DMatrix::zeros(size, size),
             panel: Panel::default(),
+            nodes: nodes..0,
             touched: Vec::new(),
             values: Vec::new(),
             rows: 0,
@@ -122,6 +125,7 @@ impl Sums {
             return;
         }
         let mut panel = std::mem::take(&mut self.panel);
+        self.nodes = self.nodes.start.min(panel.node)..self.nodes.end.max(panel.node + 2);
         let (first, places) = (MOVES * panel.node, std::mem::take(&mut panel.places));
         for (i, line) in panel.multiply().take(BOTH + places.len()).enumerate() {
             let (moves, others) = line.split_at(BOTH);
@@ -139,8 +143,10 @@ impl Sums {
     fn add_move(&mut self, column: usize, i: usize, moves: &[f64], others: (&[usize], &[f64])) {
         // The outer node has columns of its own.
         let own = if i < MOVES { 0 } else { MOVES };
-        let mut near = self.near.column_mut(column);
-        (i..BOTH).for_each(|k| near[k - own] += moves[k]);
+        let near = &mut self.near.as_mut_slice()[column * BOTH..][i - own..BOTH];
+        near.iter_mut()
+            .zip(&moves[i..])
+            .for_each(|(sum, product)| *sum += product);
         scatter(&mut self.cross, column, others.0, others.1);
     }
 
@@ -155,9 +161,12 @@ impl Sums {
         self.flush();
         let (inner, size) = (state.len(), self.others.len());
         let mut matrix = DMatrix::zeros(inner + size, inner + size);
-        let states = moves.transpose() * self.near_times(moves);
+        let first = MOVES * self.nodes.start.min(self.nodes.end);
+        let count = MOVES * self.nodes.len();
+        let moves = moves.rows(first, count);
+        let states = moves.tr_mul(&self.near_times(&moves, first));
         matrix.view_mut((0, 0), (inner, inner)).copy_from(&states);
-        let crossed = &self.cross * moves;
+        let crossed = self.cross.columns(first, count) * moves;
         let below = crossed.rows(1, size);
         matrix.view_mut((inner, 0), (size, inner)).copy_from(&below);
         self.fold();
@@ -185,17 +194,20 @@ impl Sums {
         }
     }
 
-    /// The products of moves, times `moves`.
-    fn near_times(&self, moves: &DMatrix<f64>) -> DMatrix<f64> {
+    /// The products of moves from the `from`-th on, times `moves`.
+    fn near_times(&self, moves: &DMatrixView<'_, f64>, from: usize) -> DMatrix<f64> {
         let mut product = DMatrix::zeros(moves.nrows(), moves.ncols());
         for first in (0..moves.nrows()).step_by(MOVES) {
-            let mut own = self.near.view((0, first), (MOVES, MOVES)).into_owned();
+            let mut own = self
+                .near
+                .fixed_view::<MOVES, MOVES>(0, from + first)
+                .into_owned();
             own.fill_upper_triangle_with_lower_triangle();
             let here = moves.rows(first, MOVES);
             let mut at = product.rows_mut(first, MOVES);
             at += own * here;
             if first + MOVES < moves.nrows() {
-                let next = self.near.view((MOVES, first), (MOVES, MOVES));
+                let next = self.near.fixed_view::<MOVES, MOVES>(MOVES, from + first);
                 at += next.transpose() * moves.rows(first + MOVES, MOVES);
                 let mut beyond = product.rows_mut(first + MOVES, MOVES);
                 beyond += next * here;

@@ -43,6 +43,11 @@ impl DatagramBatch {
         self.bytes.len()
     }
 
+    /// Whether there is no datagram in it.
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
+    }
+
     /// Empties the batch and keeps its memory.
     pub fn clear(&mut self) {
         self.bytes.clear();

@@ -12,14 +12,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// With room for so many returns; it grows where there are more.
-    pub fn with_room(returns: usize) -> Self {
-        Self {
-            returns: Vec::with_capacity(returns),
-            encoder_rad: Vec::with_capacity(returns),
-        }
-    }
-
     /// Adds a return, with the encoder's azimuth.
     #[inline]
     pub fn push(&mut self, echo: Return, encoder_rad: f32) {
@@ -27,8 +19,8 @@ impl Batch {
         self.encoder_rad.push(encoder_rad);
     }
 
-    /// Appends the returns to the columns.
-    pub fn flush(self, out: &mut Decoded) {
+    /// Appends the returns to the columns and keeps the room for those of the next packet.
+    pub fn flush(&mut self, out: &mut Decoded) {
         let (cloud, returns) = (&mut out.cloud, || self.returns.iter());
         out.encoder_rad.extend_from_slice(&self.encoder_rad);
         cloud.xyz_m.extend(returns().map(|echo| echo.xyz_m));
@@ -47,6 +39,8 @@ impl Batch {
             .extend(returns().map(|echo| echo.return_kind));
         cloud.packet.extend(returns().map(|echo| echo.packet));
         cloud.block.extend(returns().map(|echo| echo.block));
+        self.returns.clear();
+        self.encoder_rad.clear();
     }
 }
 
@@ -74,9 +68,11 @@ mod tests {
     #[test]
     fn a_batch_keeps_every_column_of_every_return() {
         let mut out = Decoded::default();
-        let mut batch = Batch::with_room(1);
-        (0..5).for_each(|number| batch.push(echo(number), f32::from(number)));
-        batch.flush(&mut out);
+        let mut batch = Batch::default();
+        for numbers in [0..3, 3..5] {
+            numbers.for_each(|number| batch.push(echo(number), f32::from(number)));
+            batch.flush(&mut out);
+        }
         let all: Vec<Return> = out.cloud.iter().collect();
         assert_eq!(all, (0..5).map(echo).collect::<Vec<_>>());
         assert_eq!(out.encoder_rad, [0.0, 1.0, 2.0, 3.0, 4.0]);

@@ -4,11 +4,12 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use lidar_deflect_core::capture::{Datagram, FragmentFacts};
+use lidar_deflect_core::capture::{Datagram, DatagramBatch, FragmentFacts};
 use lidar_deflect_core::drops::Drops;
 use lidar_deflect_core::stream::{Scan, ScanOptions};
 use lidar_deflect_files::{CaptureSet, FileError, FileFacts, tail};
 use pyo3::prelude::*;
+use rayon::ThreadPool;
 
 use crate::error::BorderResult;
 
@@ -16,6 +17,8 @@ use crate::error::BorderResult;
 const BLOCK: Duration = Duration::from_millis(100);
 /// The time is looked at after so many datagrams.
 const STRIDE: u32 = 256;
+/// Bytes of a batch: they stay in the cache of a core.
+const BATCH_BYTES: usize = 1 << 19;
 
 /// Whether the taker of datagrams wants another one in this block.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -70,6 +73,40 @@ impl Feed {
             progress.call1(py, (self.set.bytes_done(), self.set.bytes_total()))?;
         }
         Ok(!self.has_ended)
+    }
+
+    /// Reads the next datagrams into `room`, empty behind the last one, while `work` is done beside it.
+    pub fn batch(
+        &mut self,
+        py: Python<'_>,
+        pool: &ThreadPool,
+        progress: Option<&Py<PyAny>>,
+        room: &mut DatagramBatch,
+        work: impl FnOnce() + Send,
+    ) -> BorderResult<()> {
+        room.clear();
+        let fill = || match self.has_ended {
+            true => Ok(()),
+            false => self.run(|datagram| {
+                room.push(datagram);
+                if room.bytes() < BATCH_BYTES {
+                    Want::More
+                } else {
+                    Want::Pause
+                }
+            }),
+        };
+        py.detach(|| pool.install(|| rayon::join(fill, work))).0?;
+        py.check_signals()?;
+        if let Some(progress) = progress {
+            progress.call1(py, (self.set.bytes_done(), self.set.bytes_total()))?;
+        }
+        Ok(())
+    }
+
+    /// Reads no more.
+    pub fn stop(&mut self) {
+        self.has_ended = true;
     }
 
     fn run(&mut self, mut take: impl FnMut(&Datagram<'_>) -> Want) -> Result<(), FileError> {

@@ -13,15 +13,13 @@ use lidar_deflect_core::time::Timestamp;
 use nalgebra::{Matrix4, Point3};
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
+use rayon::ThreadPool;
 
 use crate::arrays;
 use crate::capture::CaptureScan;
-use crate::capture::feed::{Feed, Want};
-use crate::compute::compute;
+use crate::capture::feed::Feed;
+use crate::compute::pool_of;
 use crate::error::BorderResult;
-
-/// Bytes of a batch: half a second of four small lidars.
-const BATCH_BYTES: usize = 2 << 20;
 
 /// Which frames to make of which capture.
 #[pyclass(frozen, module = "lidar_deflect._native")]
@@ -92,7 +90,11 @@ impl FramePlan {
 pub struct FrameFeed {
     feed: Feed,
     reader: FrameReader,
+    /// What is looked at, and what is read meanwhile.
     batch: DatagramBatch,
+    ahead: DatagramBatch,
+    /// Begun with the first frames.
+    pool: Option<ThreadPool>,
     has_ended: bool,
 }
 
@@ -112,6 +114,8 @@ impl FrameFeed {
             feed: Feed::open(py, &plan.paths)?,
             reader: FrameReader::new(&plan.report, frames)?,
             batch: DatagramBatch::default(),
+            ahead: DatagramBatch::default(),
+            pool: None,
             has_ended: false,
         })
     }
@@ -148,19 +152,21 @@ impl FrameFeed {
             feed,
             reader,
             batch,
+            ahead,
+            pool,
             ..
         } = self;
-        batch.clear();
-        let more = feed.block(py, progress, |datagram| {
-            batch.push(datagram);
-            if batch.bytes() < BATCH_BYTES {
-                Want::More
-            } else {
-                Want::Pause
-            }
-        })?;
-        compute(py, threads, || reader.push(batch))?;
-        if !more || self.reader.is_done() {
+        let own = match pool.take() {
+            Some(own) => own,
+            None => pool_of(threads)?,
+        };
+        let own = pool.insert(own);
+        feed.batch(py, own, progress, ahead, || reader.push(batch))?;
+        std::mem::swap(batch, ahead);
+        if self.reader.is_done() {
+            self.feed.stop();
+        }
+        if self.batch.is_empty() || self.reader.is_done() {
             self.reader.finish();
             self.has_ended = true;
         }

@@ -5,7 +5,7 @@
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
-use super::{CHORD_WAVES, KNOT_M, Shape, hats, height};
+use super::{CHORD_WAVES, KNOT_M, Shape, hats};
 use crate::beam::mesh::Mesh;
 
 /// What the unknowns add at one arc length.
@@ -62,9 +62,10 @@ impl Change<'_> {
 
     /// How far a side stands out at a place along the chord, metres.
     fn height_m(&self, side: usize, x_c: f64) -> f64 {
+        let heights = super::heights(x_c);
         let of = |(values, weight): &(&[f64], f64)| -> f64 {
-            let wave = |(k, value): (usize, &f64)| value * height(k, x_c);
-            weight * values.iter().enumerate().map(wave).sum::<f64>()
+            let waves = values.iter().zip(&heights);
+            weight * waves.map(|(value, height)| value * height).sum::<f64>()
         };
         self.waves_m * self.waves[2 * side..][..2].iter().map(of).sum::<f64>()
     }

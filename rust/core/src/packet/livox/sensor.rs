@@ -12,6 +12,7 @@ use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
 use crate::packet::aim::{Centidegrees, bear, reach, wrapped};
+use crate::packet::batch::Batch;
 use crate::packet::echoes::{self, Meanings, RawEcho, judge};
 use crate::packet::frames::{RAD_PER_NS, phase_rad};
 use crate::packet::unit::{Calibration, Fitted, Gather, UnitFacts, UnitFile};
@@ -346,6 +347,7 @@ impl Model for Livox {
             decoder: Box::new(LivoxDecoder {
                 model: *self,
                 table: Centidegrees::table(),
+                batch: Batch::default(),
             }),
             calibration: Calibration::Factory,
         })
@@ -362,6 +364,7 @@ impl Livox {
 struct LivoxDecoder {
     model: Livox,
     table: Centidegrees,
+    batch: Batch,
 }
 
 /// One packet on its way.
@@ -398,9 +401,10 @@ impl<'a> Work<'a> {
     }
 
     #[inline]
-    fn push(&self, shot: Shot, echo: usize, point: &RawPoint, kind: ReturnKind, out: &mut Decoded) {
+    fn push(&self, shot: Shot, echo: usize, point: &RawPoint, kind: ReturnKind, out: &mut Batch) {
         let spot = self.packet.form.place(point, self.table);
-        out.cloud.push(&Return {
+        let encoder_rad = self.phase_rad + shot.since_ns as f64 * RAD_PER_NS;
+        let echo = Return {
             xyz_m: spot.xyz_m,
             time: self.place.time + shot.since_ns,
             range_m: spot.range_m,
@@ -411,13 +415,12 @@ impl<'a> Work<'a> {
             return_kind: kind,
             packet: self.place.packet,
             block: shot.number,
-        });
-        let encoder_rad = self.phase_rad + shot.since_ns as f64 * RAD_PER_NS;
-        out.encoder_rad.push(wrapped(encoder_rad));
+        };
+        out.push(echo, wrapped(encoder_rad));
     }
 
     /// Shots of one return each.
-    fn single(&self, out: &mut Decoded) {
+    fn single(&self, out: &mut Batch) {
         for (shot, bytes) in self.shots() {
             let point = self.packet.form.read(bytes, 0);
             if !self.packet.form.is_none(&point) {
@@ -426,18 +429,20 @@ impl<'a> Work<'a> {
         }
     }
 
-    /// Shots of several returns each.
-    fn several(&self, out: &mut Decoded) {
+    /// Shots of several returns each; how many echoes were reported twice.
+    fn several(&self, out: &mut Batch) -> u64 {
+        let mut twice = 0;
         for (shot, bytes) in self.shots() {
             let (points, echoes) = points(&self.packet, bytes);
             let (kinds, merged) = meanings(&self.packet, &points[..echoes]);
-            out.merged += u64::from(merged);
+            twice += u64::from(merged);
             for (echo, (point, kind)) in points.iter().zip(kinds).enumerate() {
                 if let Some(kind) = kind {
                     self.push(shot, echo, point, kind, out);
                 }
             }
         }
+        twice
     }
 }
 
@@ -459,14 +464,17 @@ impl Decoder for LivoxDecoder {
             lines: self.model.lines,
             table: self.table,
         };
-        let first = out.cloud.len();
+        let (first, batch) = (out.cloud.len(), &mut self.batch);
         // One loop for each kind of coordinates.
         match packet.form.coordinates {
-            coordinates if packet.form.echoes > 1 => work(coordinates).several(out),
-            Coordinates::Wide => work(Coordinates::Wide).single(out),
-            Coordinates::Narrow => work(Coordinates::Narrow).single(out),
-            Coordinates::Spherical => work(Coordinates::Spherical).single(out),
+            coordinates if packet.form.echoes > 1 => {
+                out.merged += work(coordinates).several(batch);
+            }
+            Coordinates::Wide => work(Coordinates::Wide).single(batch),
+            Coordinates::Narrow => work(Coordinates::Narrow).single(batch),
+            Coordinates::Spherical => work(Coordinates::Spherical).single(batch),
         }
+        batch.flush(out);
         if packet.form.coordinates != Coordinates::Spherical {
             let cloud = &mut out.cloud;
             bear(&cloud.xyz_m[first..], &mut cloud.azimuth_rad[first..]);

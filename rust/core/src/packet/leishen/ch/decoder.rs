@@ -44,6 +44,10 @@ pub(super) struct ChDecoder {
     lines: Vec<Line>,
     /// By hundredths of a degree, as far as the model sends them.
     aims: Vec<Aim>,
+    /// When each record of a packet was fired, after the first.
+    delays_ns: Vec<i64>,
+    /// Returns of the packet at hand.
+    batch: Batch,
 }
 
 impl ChDecoder {
@@ -71,6 +75,10 @@ impl ChDecoder {
             aims: (0..=MOST_CENTIDEG)
                 .map(|angle| Aim::new(mirror, angle))
                 .collect(),
+            delays_ns: (0..packet::count(ReturnMode::Strongest))
+                .map(|number| delay_ns(ch, number))
+                .collect(),
+            batch: Batch::default(),
         }
     }
 
@@ -78,6 +86,11 @@ impl ChDecoder {
         let known = self.aims.get(usize::from(stated_centideg)).copied();
         known.unwrap_or_else(|| Aim::new(self.ch.mirror, stated_centideg))
     }
+}
+
+/// When a record was fired, after the first of its packet.
+fn delay_ns(ch: Ch, number: usize) -> i64 {
+    (number as f64 * ch.record_ns).round() as i64
 }
 
 /// Direction of a shot.
@@ -113,7 +126,7 @@ impl Decoder for ChDecoder {
             return out.drops.add("packet_size", 1);
         };
         let mode = view.mode();
-        let mut batch = Batch::with_room(mode.returns() * packet::count(mode));
+        let mut batch = std::mem::take(&mut self.batch);
         for (number, record) in view.numbered() {
             let Some(line) = self.lines.get(usize::from(record.line)) else {
                 out.drops.add("line_unknown", 1);
@@ -123,7 +136,8 @@ impl Decoder for ChDecoder {
             out.merged += u64::from(kinds[0] == Some(ReturnKind::Merged));
             let aim = self.aim(record.azimuth);
             let direction = direction(line, &aim);
-            let delay_ns = (number as f64 * self.ch.record_ns).round() as i64;
+            let delay = self.delays_ns.get(number).copied();
+            let delay_ns = delay.unwrap_or_else(|| delay_ns(self.ch, number));
             for (index, ((range, intensity), kind)) in
                 record.echoes.into_iter().zip(kinds).enumerate()
             {
@@ -145,5 +159,6 @@ impl Decoder for ChDecoder {
             }
         }
         batch.flush(out);
+        self.batch = batch;
     }
 }

@@ -6,6 +6,7 @@ use super::description::Angles;
 use super::sensor::{Body, Shot, Solid};
 use crate::cloud::{Return, ReturnKind};
 use crate::packet::aim::{Centidegrees, bear, wrapped};
+use crate::packet::batch::Batch;
 use crate::packet::echoes::{RawEcho, judge};
 use crate::packet::{Decoded, Decoder, Model, Place, ReturnMode};
 
@@ -20,6 +21,8 @@ pub struct SolidDecoder {
     pub table: Centidegrees,
     /// Of the rows of columns.
     pub angles: Option<Angles>,
+    /// Returns of the packet at hand.
+    pub batch: Batch,
 }
 
 /// Where and when a shot was fired.
@@ -34,14 +37,15 @@ struct Ray {
 struct Work<'a> {
     place: Place,
     encoder_rad: f32,
-    out: &'a mut Decoded,
+    merged: u64,
+    out: &'a mut Batch,
 }
 
 impl Work<'_> {
     #[inline]
     fn push(&mut self, ray: &Ray, echo: RawEcho, index: u8, kind: ReturnKind) {
         let range_m = f64::from(echo.range) * UNIT_M;
-        self.out.cloud.push(&Return {
+        let echo = Return {
             xyz_m: ray.direction.map(|part| (range_m * part) as f32),
             time: self.place.time + ray.since_ns,
             range_m: range_m as f32,
@@ -52,13 +56,13 @@ impl Work<'_> {
             return_kind: kind,
             packet: self.place.packet,
             block: ray.block,
-        });
-        self.out.encoder_rad.push(self.encoder_rad);
+        };
+        self.out.push(echo, self.encoder_rad);
     }
 
     fn push_pair(&mut self, ray: &Ray, echoes: [RawEcho; 2], mode: ReturnMode) {
         let (kinds, merged) = judge(mode, &echoes);
-        self.out.merged += u64::from(merged);
+        self.merged += u64::from(merged);
         for (index, (echo, kind)) in echoes.into_iter().zip(kinds).enumerate() {
             if let Some(kind) = kind {
                 self.push(ray, echo, index as u8, kind);
@@ -110,11 +114,12 @@ impl Decoder for SolidDecoder {
             return out.drops.add("packet_size", 1);
         };
         let mode = head.return_mode;
-        let first = out.cloud.len();
+        let mut batch = std::mem::take(&mut self.batch);
         let mut work = Work {
             place,
             encoder_rad: wrapped(head.azimuth_rad),
-            out,
+            merged: 0,
+            out: &mut batch,
         };
         match self.model.body {
             Body::Columns(columns) => self.columns(columns, payload, &mut work),
@@ -129,6 +134,10 @@ impl Decoder for SolidDecoder {
                 work.push_pair(&self.ray(blocks.point, &shot), echoes, mode);
             }),
         }
+        out.merged += work.merged;
+        let first = out.cloud.len();
+        batch.flush(out);
+        self.batch = batch;
         if let Body::Blocks(blocks) = self.model.body
             && blocks.point != Point::Angles
         {

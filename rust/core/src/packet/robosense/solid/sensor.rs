@@ -12,6 +12,7 @@ use super::joined;
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
 use crate::packet::aim::Centidegrees;
+use crate::packet::batch::Batch;
 use crate::packet::echoes::RawEcho;
 use crate::packet::frames::place_rad;
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
@@ -447,6 +448,7 @@ impl Model for Solid {
                     model: *self,
                     table,
                     angles: None,
+                    batch: Batch::default(),
                 }),
                 calibration: Calibration::Factory,
             });
@@ -472,6 +474,7 @@ impl Model for Solid {
                 model: *self,
                 table,
                 angles: Some(angles),
+                batch: Batch::default(),
             }),
             calibration,
         })

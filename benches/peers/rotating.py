@@ -1,4 +1,7 @@
-"""Ouster packets to points beside ouster-sdk, on a real capture where there is one."""
+"""Ouster packets to points beside ouster-sdk, on a real capture where there is one.
+
+A file by the name of a package would be imported in its place.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ NAME = "ouster_os0_128_rng15"
 OURS, PEER = "ours, all columns", "ouster-sdk, scans and positions"
 
 
-def measure(repeats: int) -> list[Row]:
+def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
     """Print one table; return what was asked."""
     path, unit = captures.REFERENCES / f"{NAME}.pcap", captures.REFERENCES / f"{NAME}.json"
     if not path.exists():
