@@ -22,12 +22,12 @@ impl Adjustment {
     pub(super) fn seek(&mut self, gates: &Gates) -> Result<Step, BeamError> {
         let (mut step, largest, tallies) = self.wanted(gates)?;
         let (from, before) = (self.axes(), self.cost(gates, &tallies));
-        let tries = (0..SHORTENED.1).any(|_| {
+        let has_gone = (0..SHORTENED.1).any(|_| {
             let is_better = self.is_better(&step, gates, before);
             step *= SHORTENED.0;
             is_better
         });
-        let moved_m = if tries { self.moved_m(&from) } else { 0.0 };
+        let moved_m = if has_gone { self.moved_m(&from) } else { 0.0 };
         Ok(Step {
             largest,
             moved_m,
