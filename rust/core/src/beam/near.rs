@@ -86,3 +86,34 @@ impl Near {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    #[test]
+    fn a_point_off_the_side_that_is_seen_is_as_far_as_it_was_moved() {
+        let adjustment = sample::adjustment(0.0);
+        let (mesh, posed) = (&adjustment.problem.mesh, adjustment.posed(0));
+        let (blade, origin) = (posed.at(0), adjustment.rig.lidar(0).origin);
+        let mut seen = 0;
+        for k in 0..2000 {
+            let even = |step: f64| (f64::from(k) * step).fract() - 0.5;
+            let towards = Vector3::new(5.0 * even(0.618_034), 8.0, 16.0 * even(0.754_878));
+            let direction = towards.normalize();
+            let start_m = blade.nearest_s_m(mesh, &origin, &direction);
+            let Some(hit) = blade.hit(mesh, &origin, &direction, start_m) else {
+                continue;
+            };
+            let moved = |by_m: f64| hit.contact.point + hit.contact.normal * by_m;
+            let off_m = |by_m| blade.near(mesh, &moved(by_m), &direction).unwrap().off_m;
+            assert!(off_m(0.0).abs() < 1e-6);
+            assert!((off_m(0.2) - 0.2).abs() < 2e-3, "{}", off_m(0.2));
+            // Behind the side that is seen a point is off by no more than to that side.
+            assert!((-0.021..0.0).contains(&off_m(-0.02)), "{}", off_m(-0.02));
+            seen += 1;
+        }
+        assert!(seen > 100, "{seen}");
+    }
+}
