@@ -45,7 +45,8 @@ class Drawing:
         the root's rotation (rad) and the coupling of both bendings (share of their stiffness).
     shape_trust
         Of chord and its waves (relative), setting angle and waves of twist (rad), axis (chord
-        lengths) and waves of the surface (m); distance of the knots of chord and twist (m).
+        lengths) and waves of the surface (m); distances of the knots of chord and twist, and of
+        waves (m).
     source
         ``drawing`` or ``generic``.
     """
@@ -65,11 +66,11 @@ def drawing_of(inputs: Inputs) -> Drawing:
     if given is None or given.contours is None or columns is None:
         at_m, outlines = generic.outlines(blade)
         native = _native_of(inputs.config, sides, generic.stations(blade), at_m, outlines)
-        shape = (0.1, 0.05, max(setting_rad, 0.03), 0.02, blade.axis_fraction_u, 0.02, 3.0)
+        shape = (0.1, 0.05, max(setting_rad, 0.03), 0.02, blade.axis_fraction_u, 0.02, 3.0, 2.0)
         return Drawing(native, (0.25, 0.7, 0.0, 4e-4, 2e-3, COUPLING), shape, "generic")
     outlines = np.stack([given.contours.x_c, given.contours.y_c], axis=2)
     native = _native_of(inputs.config, sides, columns, given.contours.s_m, outlines)
-    shape = (0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002, 9.0)
+    shape = (0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002, 9.0, 1.0)
     return Drawing(native, (0.05, 0.5, 0.05, 1.5e-5, 1e-3, COUPLING), shape, "drawing")
 
 

@@ -26,6 +26,9 @@ pub struct ShapeTrust {
     pub waves_m: f64,
     /// Distance between the knots of chord and twist, metres.
     pub slow_knot_m: f64,
+    /// Distance between those of the waves, metres: what shorter waves leave over pulls the blade along
+    /// itself, and what is not known to decimetres cannot bear more of them.
+    pub wave_knot_m: f64,
 }
 
 impl Default for ShapeTrust {
@@ -39,6 +42,7 @@ impl Default for ShapeTrust {
             axis_fraction: 0.002,
             waves_m: 0.002,
             slow_knot_m: 9.0,
+            wave_knot_m: 1.0,
         }
     }
 }
@@ -49,8 +53,6 @@ const CHORD_WAVES: usize = 6;
 const NEAR_EDGE: f64 = 0.04;
 /// Chord from which on waves have their full height, metres.
 const FULL_WAVES_M: f64 = 1.0;
-/// Distance between the knots of the waves, metres.
-const KNOT_M: f64 = 1.0;
 
 /// Unknowns of the surface, in standard deviations.
 #[derive(Debug, Clone)]
@@ -64,12 +66,12 @@ pub struct Shape {
 impl Shape {
     /// Of the blade outboard of `from_m`; inboard of it nothing is seen.
     pub fn new(mesh: &Mesh, trust: ShapeTrust, from_m: f64) -> Self {
-        let length = (mesh.length_m() - from_m).max(KNOT_M);
+        let length = (mesh.length_m() - from_m).max(trust.wave_knot_m);
         Self {
             trust,
             from_m,
             slow: (length / trust.slow_knot_m).ceil() as usize + 1,
-            knots: (length / KNOT_M).ceil() as usize + 1,
+            knots: (length / trust.wave_knot_m).ceil() as usize + 1,
         }
     }
 
@@ -123,7 +125,8 @@ impl Shape {
         let side = usize::from(mesh.is_second_side(contact.vertex));
         let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;
         let heights = heights(contact.x_c);
-        for (knot, weight) in hats(self.arc_m(mesh, contact) - self.from_m, KNOT_M, self.knots) {
+        let x_m = self.arc_m(mesh, contact) - self.from_m;
+        for (knot, weight) in hats(x_m, self.trust.wave_knot_m, self.knots) {
             let place = first + knot * CHORD_WAVES;
             let waves = heights.iter().enumerate();
             out.extend(waves.map(|(wave, height)| (place + wave, outward * weight * height)));

@@ -74,7 +74,7 @@ impl BeamAdjustment {
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
         trust: [f64; 6],
-        shape_trust: [f64; 7],
+        shape_trust: [f64; 8],
         noise_m: f64,
         surface_m: f64,
         edge_rad: f64,
@@ -109,6 +109,7 @@ impl BeamAdjustment {
             axis_fraction,
             waves_m,
             slow_knot_m,
+            wave_knot_m,
         ] = shape_trust;
         let shape = ShapeTrust {
             chord,
@@ -118,6 +119,7 @@ impl BeamAdjustment {
             axis_fraction,
             waves_m,
             slow_knot_m,
+            wave_knot_m,
         };
         let problem = Problem {
             mesh: blade.mesh.clone(),

@@ -5,7 +5,7 @@
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
-use super::{CHORD_WAVES, KNOT_M, Shape, hats};
+use super::{CHORD_WAVES, Shape, hats};
 use crate::beam::mesh::Mesh;
 
 /// What the unknowns add at one arc length.
@@ -40,7 +40,7 @@ impl Shape {
         let chord = drawn.chord[node].xy() * drawn.chord_m[node];
         let waves = &values[3 + 2 * self.slow..];
         let side = CHORD_WAVES * self.knots;
-        let [one, two] = hats(x, KNOT_M, self.knots);
+        let [one, two] = hats(x, trust.wave_knot_m, self.knots);
         let at = |side_of: usize, (knot, weight): (usize, f64)| {
             let first = side_of * side + knot * CHORD_WAVES;
             (&waves[first..][..CHORD_WAVES], weight)
