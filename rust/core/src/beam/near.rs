@@ -73,11 +73,9 @@ impl Near {
     fn new(contact: Contact, point: &Vector3<f64>, along: f64) -> Self {
         let off = point - contact.point;
         let is_inside = along > 0.0 && along < 1.0;
-        let towards = if is_inside {
-            contact.normal
-        } else {
-            off.normalize()
-        };
+        // A point on a corner is off in no direction.
+        let aside = off.try_normalize(0.0).filter(|_| !is_inside);
+        let towards = aside.unwrap_or(contact.normal);
         let off_m = off.dot(&towards);
         Self {
             contact,
@@ -90,7 +88,6 @@ impl Near {
 #[cfg(test)]
 mod tests {
     use super::super::sample;
-    use super::*;
 
     #[test]
     fn a_point_off_the_side_that_is_seen_is_as_far_as_it_was_moved() {
@@ -98,10 +95,7 @@ mod tests {
         let (mesh, posed) = (&adjustment.problem.mesh, adjustment.posed(0));
         let (blade, origin) = (posed.at(0), adjustment.rig.lidar(0).origin);
         let mut seen = 0;
-        for k in 0..2000 {
-            let even = |step: f64| (f64::from(k) * step).fract() - 0.5;
-            let towards = Vector3::new(5.0 * even(0.618_034), 8.0, 16.0 * even(0.754_878));
-            let direction = towards.normalize();
+        for direction in sample::directions() {
             let start_m = blade.nearest_s_m(mesh, &origin, &direction);
             let Some(hit) = blade.hit(mesh, &origin, &direction, start_m) else {
                 continue;

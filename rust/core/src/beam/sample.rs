@@ -100,6 +100,14 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
     adjustment
 }
 
+/// Rays of the lidar about the blade, evenly spread.
+pub fn directions() -> impl Iterator<Item = Vector3<f64>> {
+    (0..2000).map(|k| {
+        let even = |step: f64| (f64::from(k) * step).fract() - 0.5;
+        Vector3::new(5.0 * even(0.618_034), 8.0, 16.0 * even(0.754_878)).normalize()
+    })
+}
+
 /// What the lidar sees of the present state, through lines whose phase wanders.
 fn look(adjustment: &Adjustment, shift_m: f64) -> Seen {
     let (mesh, posed, lidar) = (

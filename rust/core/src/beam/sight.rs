@@ -374,10 +374,7 @@ mod tests {
         let (mesh, posed) = (&adjustment.problem.mesh, adjustment.posed(0));
         let (blade, origin) = (posed.at(0), adjustment.rig.lidar(0).origin);
         let mut hits = 0;
-        for k in 0..2000 {
-            let even = |step: f64| (f64::from(k) * step).fract() - 0.5;
-            let towards = Vector3::new(5.0 * even(0.618_034), 8.0, 16.0 * even(0.754_878));
-            let direction = towards.normalize();
+        for direction in sample::directions() {
             let start_m = blade.nearest_s_m(mesh, &origin, &direction);
             let Some(hit) = blade.hit(mesh, &origin, &direction, start_m) else {
                 continue;
