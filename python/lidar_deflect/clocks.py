@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from lidar_deflect.channels import Channel
 
@@ -141,17 +141,21 @@ class _Pair:
         shorter = min(np.ptp(self.t), np.ptp(self.channel_t))
         return float((high - low) / shorter) if shorter > 0.0 else 0.0
 
-    def _fit(self, shift_s: float) -> tuple[float, float, Floats] | None:
+    def _fits(self, shifts_s: Floats) -> Iterator[tuple[float, tuple[float, float, Floats]]]:
+        """Fits at those of the shifts at which enough of both records lies together."""
+        first = np.searchsorted(self.t, self.channel_t[0] + shifts_s)
+        last = np.searchsorted(self.t, self.channel_t[-1] + shifts_s, side="right")
+        for k in np.flatnonzero(last - first >= max(_FEWEST, _SHARE * self.t.size)):
+            fit = self._fit(float(shifts_s[k]), slice(first[k], last[k]))
+            if fit is not None:
+                yield float(shifts_s[k]), fit
+
+    def _fit(self, shift_s: float, inside: slice) -> tuple[float, float, Floats] | None:
         """Mean square that a parabola in the deflection leaves, its share, and the residuals."""
-        at = self.t - shift_s
-        first = np.searchsorted(at, self.channel_t[0])
-        last = np.searchsorted(at, self.channel_t[-1], side="right")
-        if last - first < max(_FEWEST, _SHARE * self.t.size):
-            return None
-        d = self.d[first:last]
+        d = self.d[inside]
         if d.max() - d.min() < 0.3 * self._reach:
             return None
-        y = np.interp(at[first:last], self.channel_t, self.channel)
+        y = np.interp(self.t[inside] - shift_s, self.channel_t, self.channel)
         spread = float(np.var(y))
         if spread <= 0.2 * self._spread:
             return None
@@ -164,13 +168,13 @@ class _Pair:
     def best(self, low_s: float, high_s: float, step_s: float) -> tuple[float, float] | None:
         """Return the shift that leaves least, and what it leaves, on a grid."""
         grid = np.arange(low_s, high_s + 0.5 * step_s, step_s)
-        left = [(float(s), fit[1]) for s in grid if (fit := self._fit(float(s))) is not None]
+        left = [(shift_s, fit[1]) for shift_s, fit in self._fits(grid)]
         return min(left, key=lambda each: each[1], default=None)
 
     def refined(self, coarse_s: float) -> Shift | None:
         """Return the lowest point of the parabola through what is left near the best shift."""
         near = np.arange(coarse_s - 0.25, coarse_s + 0.2501, _FINE_S)
-        fits = [(s, fit) for s in near if (fit := self._fit(float(s))) is not None]
+        fits = list(self._fits(near))
         if len(fits) < 5:
             return None
         shifts = np.array([s for s, _ in fits])

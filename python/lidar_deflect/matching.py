@@ -98,11 +98,14 @@ def _of(opened: OpenedTest, file: Path) -> list[Channel]:
     if config.load.file == file and opened.load is not None:
         found.append(opened.load)
     named = {wire.name for wire in config.wires if wire.file == file}
-    found += [each for each in instruments.wires(config, near) if each.name in named]
+    if named:
+        found += [each for each in instruments.wires(config, near) if each.name in named]
     if config.root is not None and config.root.file == file:
         found += instruments.root(config, near)
     other = {each.name for each in config.channels if each.file == file}
-    return found + [each for each in instruments.others(config, near) if each.name in other]
+    if other:
+        found += [each for each in instruments.others(config, near) if each.name in other]
+    return found
 
 
 class _Motion:
