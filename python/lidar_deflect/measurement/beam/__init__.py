@@ -12,14 +12,15 @@ import numpy as np
 
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement.beam import clocks, rotation
-from lidar_deflect.measurement.beam.adjustment import Solved, solve
+from lidar_deflect.measurement.beam.adjustment import Solved, solve, spans_of
 from lidar_deflect.measurement.beam.budget import budget_of
 from lidar_deflect.measurement.beam.check import checks, loose_edges, objects
 from lidar_deflect.measurement.beam.expected import expected_of
-from lidar_deflect.measurement.beam.following import Followed, follow
+from lidar_deflect.measurement.beam.following import Followed, few, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
 from lidar_deflect.measurement.beam.outline import outline_of
 from lidar_deflect.measurement.beam.schedule import LAST
+from lidar_deflect.measurement.beam.stretches import stretches_of
 from lidar_deflect.measurement.beam.swung import widened
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time
 from lidar_deflect.measurement.states import DEGRADED, MISSING, OK, States, joined_names
@@ -55,13 +56,16 @@ def measure(inputs: Inputs) -> States:
         Where the blade is not found in the holds.
     """
     expected = expected_of(inputs)
-    solved = solve(inputs, expected)
     times_ns = moments(inputs)
+    holds_ns = [span_ns for _, span_ns in spans_of(inputs, expected.holds)]
+    stretches = stretches_of(expected, holds_ns, times_ns)
+    solved = solve(inputs, expected, few(stretches))
     names, sections = zip(*((x.name, x.s_m) for x in inputs.config.sections), strict=True)
     stations = _stations(inputs)
     s_m = np.array([*sections, *stations])
     holds = HoldCovariance.of(solved, s_m, LAST)
-    followed = follow(inputs, expected, solved, times_ns, (len(sections), len(stations)))
+    counts = (len(sections), len(stations))
+    followed = follow(inputs, expected, solved, stretches, times_ns, counts)
     reference, kept_m2 = _reference(inputs, s_m, followed, times_ns, solved, holds)
     moved = followed.values[..., :3] - reference
     uncertainty = over_time(followed.spreads, kept_m2, moved)

@@ -63,6 +63,8 @@ class Solved:
         Where the blade is looked for.
     clocks
         What holds the clock of each stand of a lidar.
+    ahead
+        What was seen in the spans that were read with the holds.
     """
 
     native: _native.BeamAdjustment
@@ -74,6 +76,7 @@ class Solved:
     source: str
     plan: Plan
     clocks: tuple[str, ...]
+    ahead: Sequence[_native.BeamSeen]
 
 
 def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
@@ -110,8 +113,8 @@ def _seen_in(
     return [found[place] for place in range(len(order))]
 
 
-def solve(inputs: Inputs, expected: Expected) -> Solved:
-    """Adjust all holds together.
+def solve(inputs: Inputs, expected: Expected, ahead_ns: Sequence[tuple[int, int]] = ()) -> Solved:
+    """Adjust all holds together; `ahead_ns` are spans that are wanted later, read with them.
 
     Raises
     ------
@@ -133,12 +136,13 @@ def solve(inputs: Inputs, expected: Expected) -> Solved:
     drawing = drawing_of(inputs)
     plan = paper.plan_of(inputs)
     rig = rig_prior(inputs)
-    seen = _seen_in(inputs, plan, spans)
-    native = _started(inputs, drawing, rig, expected, seen, spans, shares)
+    seen = _seen_in(inputs, plan, [*spans, *ahead_ns])
+    ahead = seen[len(spans) :]
+    native = _started(inputs, drawing, rig, expected, seen[: len(spans)], spans, shares)
     schedule = UNDRAWN if drawing.source == "generic" else DRAWN
     told, steps = _settle(native, inputs, schedule)
     clocks = tuple(rig.clocks)
-    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan, clocks)
+    return Solved(native, holds, spans, shares, told, steps, drawing.source, plan, clocks, ahead)
 
 
 def _started(
@@ -195,7 +199,7 @@ def _settle(
         steps, tries = steps + 1, tries + 1
         is_late = stage >= stages or tries >= PATIENCE
         if is_late or schedule.is_near(stage, told["moved_m"]):
-            stage, tries = stage + 1, 0
+            stage, tries = schedule.after(stage, told["moved_m"]), 0
         if listener:
             listener(stage, last)
     if listener:

@@ -13,7 +13,7 @@ from lidar_deflect.measurement.beam.schedule import LAST
 from lidar_deflect.measurement.beam.uncertainty import Spreads
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -21,17 +21,12 @@ if TYPE_CHECKING:
     from lidar_deflect.measurement.beam.adjustment import Solved
     from lidar_deflect.measurement.beam.clocks import ClockOffsets
     from lidar_deflect.measurement.beam.expected import Expected
+    from lidar_deflect.measurement.beam.stretches import Span, Stretch
     from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
     Times = NDArray[np.int64]
 
-STRETCH_NS = 800_000_000
-"""Time that is followed at once ..."""
-LOAD_SHARE = 0.15
-"""Less of it where the load changes by more: what the holds tell is taken between their loads."""
-OVERLAPS_NS = (250_000_000, 200_000_000, 150_000_000, 100_000_000, 50_000_000)
-"""... and what of its neighbours helps it: less of that, too, where the load changes by more."""
 GATES = ((0.5, 0.5), (0.2, 0.2), (0.1, 0.1), LAST)
 FITTING = 0.8
 """A stretch of which fewer echoes than this share lie on the blade was not found."""
@@ -74,9 +69,14 @@ class Followed:
 
 
 def follow(
-    inputs: Inputs, expected: Expected, solved: Solved, times_ns: Times, counts: tuple[int, int]
+    inputs: Inputs,
+    expected: Expected,
+    solved: Solved,
+    stretches: Sequence[Stretch],
+    times_ns: Times,
+    counts: tuple[int, int],
 ) -> Followed:
-    """Find the state of every section at every moment.
+    """Find the state of every section at every moment, in the holds and in `stretches` between.
 
     `counts` are those of the sections and of the stations of the blade line behind them; in a hold,
     and in a stretch between holds, the latter have the spread of the middle instant.
@@ -96,21 +96,16 @@ def follow(
         in_hold[inside] = number
         points.append(told)
     listener = inputs.listener("measure")
-    loads = expected.at(times_ns)
-    stretches = _stretches(times_ns, in_hold, loads)
-    ends_ns = [(int(times_ns[inside[0]]), int(times_ns[inside[-1]])) for inside in stretches]
-    spans = [_span(expected, *ends) for ends in ends_ns]
-    telling = clocks.telling([loads[inside] for inside in stretches], swings=expected.swings)
-    offsets = _clocks(inputs, expected, solved, [spans[place] for place in telling])
-    feed = reading(inputs, solved.plan, spans)
+    offsets = _clocks(inputs, expected, solved, stretches)
+    chunks = _seen(inputs, solved, stretches)
     for start in range(0, len(stretches), CHUNK):
         part = stretches[start : start + CHUNK]
-        seen = feed.take(len(part), inputs.listener("read"))
-        moments = [times_ns[inside] for inside in part]
-        states = _between(expected, solved, seen, spans[start : start + CHUNK], moments)
-        for inside, result in zip(part, states, strict=True):
+        moments = [times_ns[stretch.moments] for stretch in part]
+        states = _between(expected, solved, next(chunks), part, moments)
+        for stretch, result in zip(part, states, strict=True):
             if result is None or not _fits(result[2]):
                 continue
+            inside = stretch.moments
             told = by_lidar(result[2], inputs)
             values[inside] = result[0].reshape(len(inside), *shape[1:])
             spreads.put(inside, result[1])
@@ -121,58 +116,51 @@ def follow(
     return Followed(values, spreads, used, in_hold, _joined(points), offsets)
 
 
+def few(stretches: Sequence[Stretch]) -> Sequence[Span]:
+    """Return the spans that may be read ahead, with the holds: all, unless they are too many."""
+    return [stretch.span_ns for stretch in stretches] if len(stretches) <= CHUNK else []
+
+
+def _seen(
+    inputs: Inputs, solved: Solved, stretches: Sequence[Stretch]
+) -> Iterator[Sequence[BeamSeen]]:
+    """Yield what was seen in the stretches, chunk by chunk."""
+    if len(solved.ahead) == len(stretches):
+        yield solved.ahead
+        return
+    feed = reading(inputs, solved.plan, [stretch.span_ns for stretch in stretches])
+    for start in range(0, len(stretches), CHUNK):
+        yield feed.take(len(stretches[start : start + CHUNK]), inputs.listener("read"))
+
+
 def _clocks(
-    inputs: Inputs, expected: Expected, solved: Solved, spans: Sequence[tuple[int, int]]
+    inputs: Inputs, expected: Expected, solved: Solved, stretches: Sequence[Stretch]
 ) -> ClockOffsets:
     """Find the offsets of the lidars' clocks in some stretches, for all that follow."""
     kinds, native = solved.clocks, solved.native
     native.set_clocks([0.0] * len(kinds), clocks.unknown(kinds).tolist(), tied=True)
-    seen = reading(inputs, solved.plan, spans).take(len(spans)) if spans else []
-    found = _between(expected, solved, seen, spans, [np.array([], dtype=np.int64)] * len(spans))
+    telling = clocks.telling([stretch.load for stretch in stretches], swings=expected.swings)
+    part = [stretches[place] for place in telling]
+    if len(solved.ahead) == len(stretches):
+        seen = [solved.ahead[place] for place in telling]
+    else:
+        spans = [stretch.span_ns for stretch in part]
+        seen = reading(inputs, solved.plan, spans).take(len(spans)) if spans else []
+    found = _between(expected, solved, seen, part, [np.array([], dtype=np.int64)] * len(part))
     news = [result[2]["clocks"] for result in found if result is not None and _fits(result[2])]
     offsets = clocks.combined(kinds, [one for one in news if one is not None])
     native.set_clocks(offsets.offset_s.tolist(), offsets.deviation_s.tolist(), tied=False)
     return offsets
 
 
-def _stretches(
-    times_ns: Times, in_hold: NDArray[np.int64], shares: Floats
-) -> list[NDArray[np.intp]]:
-    """Moments between holds, cut into stretches; `shares` are the loads at all moments."""
-    between = np.flatnonzero(in_hold < 0)
-    if not between.size:
-        return []
-    breaks = [0]
-    for place in range(1, len(between)):
-        goes_on = between[place] == between[place - 1] + 1
-        now, start = between[place], between[breaks[-1]]
-        is_long = times_ns[now] - times_ns[start] >= STRETCH_NS
-        if not goes_on or is_long or abs(shares[now] - shares[start]) > LOAD_SHARE:
-            breaks.append(place)
-    return np.split(between, breaks[1:])
-
-
-def _span(expected: Expected, first_ns: int, last_ns: int) -> tuple[int, int]:
-    return first_ns - _overlap_ns(expected, first_ns, -1), last_ns + _overlap_ns(
-        expected, last_ns, 1
-    )
-
-
-def _overlap_ns(expected: Expected, end_ns: int, side: int) -> int:
-    """How much of a neighbour has nearly the load of the end of a stretch."""
-    shares = expected.at([end_ns, *(end_ns + side * apart_ns for apart_ns in OVERLAPS_NS)])
-    is_alike = np.abs(shares[1:] - shares[0]) <= LOAD_SHARE
-    return OVERLAPS_NS[int(np.argmax(is_alike)) if is_alike.any() else -1]
-
-
 def _between(
     expected: Expected,
     solved: Solved,
     seen: Sequence[BeamSeen],
-    spans: Sequence[tuple[int, int]],
+    stretches: Sequence[Stretch],
     moments: Sequence[Times],
 ) -> list[Any]:
-    native = solved.native
+    native, spans = solved.native, [stretch.span_ns for stretch in stretches]
     gates, sway_m = (SWING_GATES, SWING_M) if expected.swings else (GATES, SWAY_M)
     return native.follow(
         seen,

@@ -414,11 +414,15 @@ impl Adjustment {
         )
     }
 
+    /// The lidars as estimated so far.
+    pub(super) fn lidars(&self) -> Vec<Lidar> {
+        let all = 0..self.rig.poses.len();
+        all.map(|lidar| self.rig.lidar(lidar)).collect()
+    }
+
     /// Normal equations at the present unknowns, with what became of the data.
     pub fn normal(&self, gates: &Gates) -> (Normal, Vec<Tally>) {
-        let lidars: Vec<Lidar> = (0..self.rig.poses.len())
-            .map(|l| self.rig.lidar(l))
-            .collect();
+        let lidars = self.lidars();
         let parts: Vec<(Part, Tally)> = (0..self.problem.holds.len())
             .into_par_iter()
             .map(|hold| Rows::new(self, hold, &lidars, gates).collect())

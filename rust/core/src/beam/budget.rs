@@ -5,12 +5,12 @@ use std::ops::Range;
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::{Adjustment, Gates, Stage};
 use super::factor::Factor;
 use super::family::Kind;
+use super::few::Few;
 use super::layout::RIG;
 use super::normal::Normal;
-use super::rig::Lidar;
 use super::rows::Rows;
 use super::solution::Solution;
 use super::sums::Part;
@@ -52,15 +52,13 @@ impl Adjustment {
         let (rows, gates) = (self.value_rows(s_m), &solution.gates);
         let edges = mirrored(self.edges(gates));
         let prior = mirrored(self.prior(gates.stage));
-        let solved = &solution.covariance * &rows;
-        let of_edges = shares(&edges, &solved);
-        let of_prior = &prior * &solved;
+        let solved = self.solved(&rows, &solution.covariance);
+        let (of_edges, of_prior) = rayon::join(|| &edges * &solved, || &prior * &solved);
         let mut groups = vec![vec![0.0; rows.ncols()]; GROUPS.len()];
-        for (column, total) in sums(&shares(&solution.matrix, &solved))
-            .into_iter()
-            .enumerate()
-        {
-            let step = of_edges.column(column).sum();
+        for column in 0..rows.ncols() {
+            let answer = solved.column(column);
+            let total = rows.column(column).dot(&answer);
+            let step = of_edges.column(column).dot(&answer);
             groups[1][column] = step;
             groups[0][column] = total - step;
             for (group, unknowns) in self.sources() {
@@ -84,8 +82,7 @@ impl Adjustment {
         &self,
         solution: &Solution,
     ) -> Result<Vec<(&'static str, [f64; 3])>, BeamError> {
-        let prior = self.prior(solution.gates.stage).matrix;
-        let before = Factor::new(prior).ok_or(BeamError::Singular)?.inverse();
+        let before = self.deviations_before(solution.gates.stage)?;
         let after = &solution.covariance;
         let mut known = vec![("", [0.0; 3]); self.layout.len()];
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
@@ -96,11 +93,38 @@ impl Adjustment {
                 } else {
                     self.values[i] - self.expected[i]
                 };
-                let deviations = [before[(i, i)].sqrt(), after[(i, i)].sqrt()];
+                let deviations = [before[i], after[(i, i)].sqrt()];
                 known[i] = (GROUPS[group], [change, deviations[0], deviations[1]]);
             }
         }
         Ok(known)
+    }
+
+    /// Slopes solved by the normal matrix; those of one hold touch few unknowns.
+    fn solved(&self, rows: &DMatrix<f64>, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+        let count = rows.ncols() / self.problem.holds.len();
+        let of = |hold: usize| Few::of(rows, hold * count, count).carried(covariance);
+        let holds = (0..self.problem.holds.len()).into_par_iter();
+        let parts: Vec<DMatrix<f64>> = holds.map(of).collect();
+        let mut solved = DMatrix::zeros(rows.nrows(), rows.ncols());
+        for (hold, part) in parts.iter().enumerate() {
+            solved.columns_mut(hold * count, count).copy_from(part);
+        }
+        solved
+    }
+
+    /// Standard deviations of all unknowns before the data: only clocks and lidars are known together.
+    fn deviations_before(&self, stage: Stage) -> Result<Vec<f64>, BeamError> {
+        let prior = self.prior(stage).matrix;
+        let (first, end) = (self.layout.clock_at(0), self.layout.shape_at());
+        let block = prior.view((first, first), (end - first, end - first));
+        let together = Factor::new(block.into_owned()).ok_or(BeamError::Singular)?;
+        let covariance = together.inverse();
+        let of = |i: usize| match (first..end).contains(&i) {
+            true => covariance[(i - first, i - first)].sqrt(),
+            false => prior[(i, i)].recip().sqrt(),
+        };
+        Ok((0..self.layout.len()).map(of).collect())
     }
 
     /// Slopes of all values of all sections by all unknowns.
@@ -125,9 +149,7 @@ impl Adjustment {
     }
 
     fn edges(&self, gates: &Gates) -> Normal {
-        let lidars: Vec<Lidar> = (0..self.rig.poses.len())
-            .map(|l| self.rig.lidar(l))
-            .collect();
+        let lidars = self.lidars();
         let of = |hold| Rows::new(self, hold, &lidars, gates).of_edges();
         let parts: Vec<Part> = (0..self.problem.holds.len())
             .into_par_iter()
@@ -175,20 +197,8 @@ fn mirrored(normal: Normal) -> DMatrix<f64> {
     matrix
 }
 
-/// Share of every unknown in `v^T matrix v`, for each column `v`.
-fn shares(matrix: &DMatrix<f64>, solved: &DMatrix<f64>) -> DMatrix<f64> {
-    (matrix * solved).component_mul(solved)
-}
-
-fn sums(shares: &DMatrix<f64>) -> Vec<f64> {
-    (0..shares.ncols())
-        .map(|k| shares.column(k).sum())
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::adjust::Stage;
     use super::super::sample;
     use super::*;
 

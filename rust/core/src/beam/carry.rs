@@ -2,8 +2,10 @@
 //! state by its derivatives.
 
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3};
+use rayon::prelude::*;
 
 use super::adjust::Adjustment;
+use super::few::Few;
 use super::layout::RANGES;
 use super::posed::Posed;
 use super::sections::{Rests, Sections};
@@ -36,16 +38,11 @@ pub struct Spread {
 impl Knowledge {
     /// Spreads by slopes of x, y, z and twist of the first sections.
     fn spreads(&self, rows: &DMatrix<f64>) -> Vec<Spread> {
-        // Few unknowns move a single state: the others have no part in its spread.
-        let touched = touched(rows);
-        let rows = rows.select_rows(&touched);
-        let known = self
-            .covariance
-            .select_columns(&touched)
-            .select_rows(&touched);
-        let (carried, rest) = (known * &rows, self.rest_carried.select_rows(&touched));
+        let few = Few::of(rows, 0, rows.ncols());
+        let carried = few.own_carried(&self.covariance);
+        let rest = few.rows_of(&self.rest_carried);
         let of = |k: usize| {
-            let own = rows.columns(4 * k, 4);
+            let own = few.slopes().columns(4 * k, 4);
             let block = own.tr_mul(&carried.columns(4 * k, 4));
             let cross = matrix(&own.tr_mul(&rest.columns(3 * k, 3)));
             let position = matrix(&block);
@@ -59,14 +56,25 @@ impl Knowledge {
     }
 }
 
-/// Rows that are not zero.
-fn touched(rows: &DMatrix<f64>) -> Vec<usize> {
-    let mut is_touched = vec![false; rows.nrows()];
-    for column in rows.column_iter() {
-        let entries = is_touched.iter_mut().zip(column.iter());
-        entries.for_each(|(is_one, slope)| *is_one |= *slope != 0.0);
+/// Joint covariance of the values that `rows` are the slopes of, `count` to a hold.
+fn joint(rows: &DMatrix<f64>, count: usize, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let holds = rows.ncols() / count;
+    let few: Vec<Few> = (0..holds)
+        .map(|hold| Few::of(rows, hold * count, count))
+        .collect();
+    let pairs: Vec<(usize, usize)> = (0..holds)
+        .flat_map(|one| (0..=one).map(move |two| (one, two)))
+        .collect();
+    let of = |(one, two): &(usize, usize)| few[*one].with(&few[*two], covariance);
+    let blocks: Vec<DMatrix<f64>> = pairs.par_iter().map(of).collect();
+    let mut all = DMatrix::zeros(rows.ncols(), rows.ncols());
+    for ((one, two), block) in pairs.into_iter().zip(blocks) {
+        let (below, beside) = ((one * count, two * count), (two * count, one * count));
+        all.view_mut(below, (count, count)).copy_from(&block);
+        all.view_mut(beside, (count, count))
+            .copy_from(&block.transpose());
     }
-    (0..rows.nrows()).filter(|row| is_touched[*row]).collect()
+    all
 }
 
 /// The first three rows and columns.
@@ -91,9 +99,9 @@ impl Adjustment {
         let covariance = solution.covariance.clone();
         let rests = self.rests(s_m);
         let (values, rows) = self.section_rows(&rests);
-        let carried = &covariance * &rows;
         let columns: Vec<usize> = (0..3 * s_m.len()).map(|k| 4 * (k / 3) + k % 3).collect();
-        let rest_carried = carried.select_columns(&columns);
+        let first = rows.select_columns(&columns);
+        let rest_carried = Few::of(&first, 0, first.ncols()).carried(&covariance);
         let own = |k: usize| {
             let at = rows.columns(4 * k, 3);
             matrix(&at.tr_mul(&rest_carried.columns(3 * k, 3)))
@@ -104,7 +112,7 @@ impl Adjustment {
             rest_carried,
             covariance,
         };
-        let covariance = rows.transpose() * &carried;
+        let covariance = joint(&rows, 4 * s_m.len(), &knowledge.covariance);
         (Sections { values, covariance }, knowledge)
     }
 
@@ -279,11 +287,29 @@ mod tests {
         for _ in 0..3 {
             part.step(&GATES).unwrap();
         }
-        let (normal, _) = part.last_step(&GATES).unwrap();
+        let (normal, _) = part.last_step(&GATES, 0..part.layout.len()).unwrap();
         let factor = part.free_factor(&normal).unwrap();
         let (_, rows) = part.states_at(&knowledge.rests, &part.posed(0), 0, TIME_NS);
         let between = stretch.between(&[1.0]);
-        holds.inherited(&part, &knowledge, between, (&normal, &factor), &rows)[0].position
+        let solved = (&normal.matrix, &factor);
+        holds.inherited(&part, &knowledge, between, solved, &rows)[0].position
+    }
+
+    #[test]
+    fn a_stretch_that_is_asked_for_no_state_tells_the_same_of_the_clocks() {
+        let holds = sample::adjustment(0.0);
+        let solution = holds.solution(&GATES).unwrap();
+        let (_, knowledge) = holds.knowledge(&[55.0], &solution);
+        let news = |times_ns: &[i64]| {
+            let mut part = holds.stretch(&stretch(&holds), &[1.0]).unwrap();
+            let found = part.follow((&holds, &knowledge), (0, 0, 0.0), times_ns, &[GATES; 2]);
+            found.unwrap().clocks.unwrap().information[(0, 0)]
+        };
+        let (alone, with_states) = (news(&[]), news(&[TIME_NS]));
+        assert!(
+            (alone / with_states - 1.0).abs() < 1e-6,
+            "{alone} {with_states}"
+        );
     }
 
     #[test]

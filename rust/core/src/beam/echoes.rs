@@ -45,6 +45,24 @@ pub struct Seen {
     pub edges: Vec<Edge>,
 }
 
+impl Seen {
+    /// Brings what a beam saw in one sweep after the other together, and the ends of each side: they meet the same
+    /// part of the blade, and sums over it stay where they are at hand.
+    pub fn sort(&mut self) {
+        self.echoes
+            .sort_by_key(|echo| (echo.lidar, echo.ring, echo.time_ns));
+        self.edges
+            .sort_by_key(|edge| (edge.lidar, edge.ring, edge.turns_left(), edge.time_ns));
+    }
+}
+
+impl Edge {
+    /// Whether the miss lies to the left of the hit, as the sensor stands.
+    fn turns_left(&self) -> bool {
+        self.hit.x * self.miss.y > self.hit.y * self.miss.x
+    }
+}
+
 /// Echoes of a run that is too short to have edges.
 const SHORT_RUN: usize = 5;
 /// Neighbours in a run are not farther apart in range, metres.
@@ -127,5 +145,30 @@ fn end(run: &[LineEcho], period_ns: f64, is_last: bool) -> Edge {
         hit,
         miss: (hit + (hit - before) / shots).normalize(),
         range_m: at(2).xyz_m.norm(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sweeps_of_a_beam_and_ends_of_a_side_come_together() {
+        let line = |time_ns: i64| -> Vec<LineEcho> {
+            let at = |k: i64| LineEcho {
+                time_ns: time_ns + k,
+                xyz_m: Vector3::new(0.01 * k as f64, 20.0, 0.0),
+            };
+            (0..6).map(at).collect()
+        };
+        let mut seen = Seen::default();
+        for (ring, time_ns) in [(1, 0), (0, 100), (1, 200)] {
+            add_line(&mut seen, 0, ring, &line(time_ns), 1.0, |_, _| false);
+        }
+        seen.sort();
+        let rings: Vec<usize> = seen.echoes.iter().map(|echo| echo.ring).collect();
+        assert_eq!(rings, [[0; 6], [1; 6], [1; 6]].concat());
+        let times: Vec<i64> = seen.edges.iter().map(|edge| edge.time_ns).collect();
+        assert_eq!(times, [105, 100, 5, 205, 0, 200]);
     }
 }

@@ -1,7 +1,8 @@
 //! A positive matrix as the square of a triangle, block by block: products of blocks go at the speed of the
 //! machine, single columns at that of its memory.
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector};
+use rayon::prelude::*;
 
 /// Rows and columns of a block.
 const BLOCK: usize = 64;
@@ -23,22 +24,26 @@ impl Factor {
             corner.copy_from(&triangle);
             let (rest, below) = (first + width, size - first - width);
             let mut across = matrix.view((rest, first), (below, width)).transpose();
-            triangle.solve_lower_triangular_mut(&mut across);
+            let blocks = across.as_mut_slice().par_chunks_mut(BLOCK * width);
+            blocks.for_each(|block| {
+                let wide = block.len() / width;
+                let mut block = DMatrixViewMut::from_slice(block, width, wide);
+                triangle.solve_lower_triangular_mut(&mut block);
+            });
             let down = across.transpose();
             matrix
                 .view_mut((rest, first), (below, width))
                 .copy_from(&down);
-            for from in (0..below).step_by(BLOCK) {
-                let wide = BLOCK.min(below - from);
-                matrix
-                    .view_mut((rest + from, rest + from), (below - from, wide))
-                    .gemm(
-                        -1.0,
-                        &down.rows(from, below - from),
-                        &across.columns(from, wide),
-                        1.0,
-                    );
-            }
+            // Columns of a block lie together in memory: each block is one thread's.
+            let behind = matrix.as_mut_slice()[rest * size..].par_chunks_mut(BLOCK * size);
+            behind.enumerate().for_each(|(number, block)| {
+                let (from, wide) = (number * BLOCK, block.len() / size);
+                let mut block = DMatrixViewMut::from_slice(block, size, wide);
+                let (left, right) = (down.rows(from, below - from), across.columns(from, wide));
+                block
+                    .rows_mut(rest + from, below - from)
+                    .gemm(-1.0, &left, &right, 1.0);
+            });
         }
         matrix.fill_upper_triangle(0.0, 1);
         Some(Self { lower: matrix })
@@ -64,36 +69,47 @@ impl Factor {
         let (size, root) = (self.lower.nrows(), self.inverse_root());
         let across = root.transpose();
         let mut inverse = DMatrix::zeros(size, size);
-        for first in (0..size).step_by(BLOCK) {
-            let (width, below) = (BLOCK.min(size - first), size - first);
-            inverse.view_mut((first, first), (below, width)).gemm(
+        let blocks = inverse.as_mut_slice().par_chunks_mut(BLOCK * size);
+        blocks.enumerate().for_each(|(number, block)| {
+            let (first, width) = (number * BLOCK, block.len() / size);
+            let below = size - first;
+            let mut block = DMatrixViewMut::from_slice(block, size, width);
+            block.rows_mut(first, below).gemm(
                 1.0,
                 &across.view((first, first), (below, below)),
                 &root.view((first, first), (below, width)),
                 0.0,
             );
-        }
+        });
         inverse.fill_upper_triangle_with_lower_triangle();
         inverse
     }
 
-    /// Inverse of the triangle.
+    /// Inverse of the triangle: blocks of its columns have nothing to do with each other.
     fn inverse_root(&self) -> DMatrix<f64> {
         let size = self.lower.nrows();
         let mut root = DMatrix::zeros(size, size);
-        for first in (0..size).step_by(BLOCK) {
-            let width = BLOCK.min(size - first);
-            let corner = self.lower.view((first, first), (width, width));
-            let mut rows = DMatrix::zeros(width, first + width);
-            rows.view_mut((0, first), (width, width)).fill_diagonal(1.0);
-            let before = self.lower.view((first, 0), (width, first));
-            rows.columns_mut(0, first)
-                .gemm(-1.0, &before, &root.view((0, 0), (first, first)), 0.0);
-            corner.solve_lower_triangular_mut(&mut rows);
-            root.view_mut((first, 0), (width, first + width))
-                .copy_from(&rows);
-        }
+        let blocks = root.as_mut_slice().par_chunks_mut(BLOCK * size);
+        blocks.enumerate().for_each(|(number, block)| {
+            let width = block.len() / size;
+            let mut block = DMatrixViewMut::from_slice(block, size, width);
+            self.fill_root(&mut block, number * BLOCK);
+        });
         root
+    }
+
+    /// The columns of the inverse from `first` on.
+    fn fill_root(&self, block: &mut DMatrixViewMut<'_, f64>, first: usize) {
+        let (size, wide) = block.shape();
+        block.view_mut((first, 0), (wide, wide)).fill_diagonal(1.0);
+        for from in (first..size).step_by(BLOCK) {
+            let width = BLOCK.min(size - from);
+            let corner = self.lower.view((from, from), (width, width));
+            let (above, mut below) = block.rows_range_pair_mut(first..from, from..from + width);
+            let before = self.lower.view((from, first), (width, from - first));
+            below.gemm(-1.0, &before, &above, 1.0);
+            corner.solve_lower_triangular_mut(&mut below);
+        }
     }
 }
 

@@ -84,7 +84,11 @@ impl Gather {
         (is_past || self.has_ended)
             .then(|| self.open.pop_front())
             .flatten()
-            .map(|window| window.seen)
+            .map(|window| {
+                let mut seen = window.seen;
+                seen.sort();
+                seen
+            })
     }
 }
 

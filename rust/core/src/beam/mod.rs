@@ -17,6 +17,7 @@ pub mod echoes;
 pub mod equilibrium;
 pub mod factor;
 pub mod family;
+mod few;
 pub mod gather;
 pub mod layout;
 pub mod mesh;

@@ -1,8 +1,10 @@
 //! Outlines of material sections as the adjustment has them, with how well each point is known.
 
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 
 use super::adjust::Adjustment;
+use super::few::Few;
 use super::mesh::Mesh;
 use super::posed::Posed;
 use super::sections::Place;
@@ -12,25 +14,37 @@ impl Adjustment {
     /// By hold, section and point of the outline: x, y, z in metres, averaged over the hold, and the
     /// standard deviation along the outward normal, metres.
     pub fn outlines(&self, s_m: &[f64], solution: &Solution) -> Vec<[f64; 4]> {
-        let count = self.problem.mesh.outline[0].len();
-        let holds = self.problem.holds.len();
-        let mut points = Vec::with_capacity(holds * s_m.len() * count);
-        let mut rows = DMatrix::zeros(self.layout.len(), holds * s_m.len() * count);
-        for hold in 0..holds {
+        let holds = (0..self.problem.holds.len()).into_par_iter();
+        let of = |hold: usize| {
             let posed = self.posed(hold);
-            for s in s_m {
-                for vertex in 0..count {
-                    let mut place = self.place_at(&posed, hold, *s, None);
-                    self.put_on(&mut place, &posed, hold, vertex);
-                    let column = points.len();
-                    points.push(self.surface_point(&mut rows, column, (&posed, hold), &place));
-                }
-            }
-        }
-        let solved = &solution.covariance * &rows;
-        let sigma = |k: usize| rows.column(k).dot(&solved.column(k)).max(0.0).sqrt();
-        let known = points.iter().enumerate();
-        known.map(|(k, p)| [p.x, p.y, p.z, sigma(k)]).collect()
+            let section = |s: &f64| self.outline(&posed, hold, *s, &solution.covariance);
+            s_m.iter().flat_map(section).collect::<Vec<_>>()
+        };
+        let parts: Vec<Vec<[f64; 4]>> = holds.map(of).collect();
+        parts.concat()
+    }
+
+    fn outline(
+        &self,
+        posed: &Posed,
+        hold: usize,
+        s_m: f64,
+        covariance: &DMatrix<f64>,
+    ) -> Vec<[f64; 4]> {
+        let count = self.problem.mesh.outline[0].len();
+        let mut rows = DMatrix::zeros(self.layout.len(), count);
+        let middle = self.place_at(posed, hold, s_m, None);
+        let mut point = |vertex: usize| {
+            let mut place = middle.clone();
+            self.put_on(&mut place, posed, hold, vertex);
+            self.surface_point(&mut rows, vertex, (posed, hold), &place)
+        };
+        let points: Vec<Vector3<f64>> = (0..count).map(&mut point).collect();
+        let variances = Few::of(&rows, 0, count).variances(covariance);
+        let known = points.iter().zip(variances);
+        known
+            .map(|(p, variance)| [p.x, p.y, p.z, variance.max(0.0).sqrt()])
+            .collect()
     }
 
     /// Moves a place from the middle of the chord to a point of the outline.

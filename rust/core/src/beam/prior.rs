@@ -25,6 +25,15 @@ impl Adjustment {
         self.problem.trust.free_rad_m > VAGUE_RAD_M
     }
 
+    /// Behind the last unknown that may change at a stage.
+    pub(super) fn open_until(&self, stage: Stage) -> usize {
+        match stage {
+            Stage::Loads => self.layout.lidar_at(0),
+            Stage::Blade => self.layout.shape_at(),
+            Stage::All => self.layout.len(),
+        }
+    }
+
     /// The first stage at which an unknown may change.
     fn needs(&self, unknown: usize) -> Stage {
         if unknown >= self.layout.lidar_at(0) {

@@ -21,6 +21,20 @@ const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
 /// The same of edges beside facets seen at a grazing angle over so much, metres across: they are soft.
 const SOFT_M: (f64, f64) = (0.008, 0.016);
 
+/// So many echoes and edges bring the blade to where all of them can take it in one step: the gate is still wide.
+const WIDE: (usize, usize) = (3000, 1000);
+
+/// At most so many echoes, evenly.
+pub(super) fn some(all: &[Echo], most: usize) -> impl Iterator<Item = &Echo> {
+    let count = most.min(all.len());
+    (0..count).map(move |k| &all[k * all.len() / count])
+}
+
+/// At most so many edges, evenly; an odd stride, for ends of scan lines come by twos.
+pub(super) fn some_edges(all: &[Edge], most: usize) -> impl Iterator<Item = &Edge> {
+    all.iter().step_by(all.len().div_ceil(most) | 1)
+}
+
 /// Where unknowns stand that every row asks for: sums over holds and lidars, made once.
 struct Places {
     sway: usize,
@@ -64,6 +78,10 @@ pub struct Rows<'a> {
     noise_m: Vec<f64>,
     /// Whether single echoes are wanted; nobody asks a stretch before its last step.
     keeps: bool,
+    /// Whether it is the cost alone that is wanted.
+    pub(super) only_costs: bool,
+    /// Where the last edge lay, arc length in metres.
+    last_edge_m: Option<f64>,
     pub(super) tally: Tally,
 }
 
@@ -97,6 +115,8 @@ impl<'a> Rows<'a> {
                 .map(|noise_m| noise_m.hypot(gates.coarse_m()[0]))
                 .collect(),
             keeps: gates.is_fine() || !adjustment.follows_load,
+            only_costs: false,
+            last_edge_m: None,
             tally: Tally::default(),
             adjustment,
         }
@@ -108,19 +128,30 @@ impl<'a> Rows<'a> {
             return self.collect_near();
         }
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let most = self.adjustment.weights.echoes;
-        let stride = seen.echoes.len().div_ceil(most).max(1);
+        let (echoes, edges) = self.most();
         if self.keeps {
-            self.tally.used.reserve(seen.echoes.len() / stride + 1);
+            self.tally.used.reserve(echoes.min(seen.echoes.len()));
         }
         let mut hint = None;
-        for echo in seen.echoes.iter().step_by(stride) {
+        for echo in some(&seen.echoes, echoes) {
             hint = self.add_echo(echo, hint);
         }
-        for edge in &seen.edges {
+        for edge in some_edges(&seen.edges, edges) {
             self.add_edge(edge);
         }
         self.finish()
+    }
+
+    /// How many echoes and how many edges are used: few to come near. Without a drawing steps are held back
+    /// against the data, and with few of them the holds would not arrive.
+    fn most(&self) -> (usize, usize) {
+        let adjustment = self.adjustment;
+        let most = adjustment.weights.echoes;
+        let is_held_back = adjustment.is_vague() && !adjustment.follows_load;
+        match self.gates.is_fine() || is_held_back {
+            true => (most, usize::MAX),
+            false => (most.min(WIDE.0), WIDE.1),
+        }
     }
 
     /// The rows of the edges alone.
@@ -315,10 +346,12 @@ impl<'a> Rows<'a> {
             self.places.clock + lidar,
             along.dot(&velocity_m_s) * clock_s,
         ));
-        if self.adjustment.free.end > self.places.lidars[0] {
+        if self.adjustment.free.end > self.places.shape {
             let (mesh, first) = (&problem.mesh, self.places.shape);
             problem.shape.slopes(mesh, contact, along, first, row);
             problem.shape.waves(mesh, contact, along, first, row);
+        }
+        if self.adjustment.free.end > self.places.lidars[0] {
             self.lidars[lidar].slopes(contact, along, self.places.lidars[lidar], row);
         }
         if self.adjustment.free.end > self.places.len {
@@ -344,11 +377,14 @@ impl<'a> Rows<'a> {
         let mesh = &self.adjustment.problem.mesh;
         let time_ns = self.time_ns(edge.lidar, edge.time_ns);
         let blade = self.posed.at(time_ns);
-        let near = blade.nearest_s_m(mesh, &plane.origin, &hit);
-        let Some(silhouette) = blade.silhouette(mesh, &plane, near) else {
+        let near = |s_m: f64| blade.silhouette(mesh, &plane, s_m);
+        let known = self.last_edge_m.and_then(near);
+        let Some(silhouette) = known.or_else(|| near(blade.nearest_s_m(mesh, &plane.origin, &hit)))
+        else {
             self.tally.edges_left_out[1] += 1;
             return;
         };
+        self.last_edge_m = Some(self.arc_m(&silhouette.contact));
         self.add_silhouette(edge, time_ns, &plane, &silhouette, step_rad);
     }
 
@@ -387,6 +423,9 @@ impl<'a> Rows<'a> {
         let depth_m = (edge.range_m - silhouette.range_m).abs();
         let variance = sigma_rad * sigma_rad + grid;
         self.tally.cost += cost(residual, sigma, gate_rad, variance);
+        if self.only_costs {
+            return;
+        }
         if residual.abs() > gate_rad || depth_m > self.gates.echo_m.max(0.5) {
             self.tally.edges_left_out[2] += 1;
             return;
@@ -447,6 +486,27 @@ mod tests {
         edge_m: 3.0,
         stage: Stage::All,
     };
+
+    #[test]
+    fn no_more_data_than_are_wanted_are_taken_from_all_of_them() {
+        let adjustment = sample::adjustment(0.0);
+        let seen = &adjustment.problem.holds[0].seen;
+        let (echoes, edges) = (seen.echoes.len(), seen.edges.len());
+        let most = echoes * 2 / 3;
+        let taken: Vec<i64> = some(&seen.echoes, most).map(|echo| echo.time_ns).collect();
+        assert_eq!(taken.len(), most);
+        assert_eq!(
+            taken[most / 2],
+            seen.echoes[most / 2 * echoes / most].time_ns
+        );
+        assert_eq!(some(&seen.echoes, echoes + 1).count(), echoes);
+        // Every third, for every second would be the ends of one side.
+        assert_eq!(
+            some_edges(&seen.edges, edges / 2).count(),
+            edges.div_ceil(3)
+        );
+        assert_eq!(some_edges(&seen.edges, usize::MAX).count(), edges);
+    }
 
     #[test]
     fn slopes_of_all_unknowns_are_those_of_the_residuals() {

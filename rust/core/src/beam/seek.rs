@@ -1,11 +1,12 @@
 //! How the blade is found, from metres away: by distances of points, in steps that have to do good.
 
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 use super::adjust::{Adjustment, Gates};
 use super::echoes::Echo;
 use super::near::Near;
-use super::rows::{MIXED_ECHOES, Rows};
+use super::rows::{MIXED_ECHOES, Rows, some, some_edges};
 use super::step::Step;
 use super::sums::Part;
 use super::weights::{Tally, cost, robust};
@@ -20,8 +21,18 @@ impl Adjustment {
     /// A step of Gauss and Newton, shortened until the data cost less than before: far from the blade slopes
     /// promise what equilibria do not keep.
     pub(super) fn seek(&mut self, gates: &Gates) -> Result<Step, BeamError> {
+        let all = self.free.clone();
+        // What the stage holds would only make its equations larger.
+        self.free.end = self.open_until(gates.stage).min(all.end);
+        let step = self.sought(gates);
+        self.free = all;
+        step
+    }
+
+    fn sought(&mut self, gates: &Gates) -> Result<Step, BeamError> {
         let (mut step, largest, tallies) = self.wanted(gates)?;
-        let (from, before) = (self.axes(), self.cost(gates, &tallies));
+        let of_data = tallies.iter().map(|tally| tally.cost).sum::<f64>();
+        let (from, before) = (self.axes(), self.surprise(gates.stage) + of_data);
         let has_gone = (0..SHORTENED.1).any(|_| {
             let is_better = self.is_better(&step, gates, before);
             step *= SHORTENED.0;
@@ -40,33 +51,45 @@ impl Adjustment {
         let spot = self.spot();
         self.values += step;
         self.settle_in(step);
-        let is_better = self.linearise().is_ok() && {
-            let (_, tallies) = self.normal(gates);
-            self.cost(gates, &tallies) < before
-        };
+        let is_better = self.linearise().is_ok() && self.cost(gates) < before;
         if !is_better {
             self.return_to(spot);
         }
         is_better
     }
 
-    /// What the unknowns cost, by what became of the data and by what was known before.
-    fn cost(&self, gates: &Gates, tallies: &[Tally]) -> f64 {
-        self.surprise(gates.stage) + tallies.iter().map(|tally| tally.cost).sum::<f64>()
+    /// What the unknowns cost, by the data and by what was known before.
+    fn cost(&self, gates: &Gates) -> f64 {
+        let lidars = self.lidars();
+        let of = |hold| Rows::new(self, hold, &lidars, gates).cost();
+        let holds = (0..self.problem.holds.len()).into_par_iter();
+        let of_data: Vec<f64> = holds.map(of).collect();
+        self.surprise(gates.stage) + of_data.iter().sum::<f64>()
     }
 }
 
 impl Rows<'_> {
+    /// What the data cost.
+    fn cost(mut self) -> f64 {
+        self.only_costs = true;
+        self.look();
+        self.tally.cost
+    }
+
     /// Rows by distances of points, and what became of the data.
     pub(super) fn collect_near(mut self) -> (Part, Tally) {
+        self.look();
+        self.finish()
+    }
+
+    fn look(&mut self) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        for echo in some(&seen.echoes) {
+        for echo in some(&seen.echoes, ENOUGH) {
             self.add_point(echo);
         }
-        for edge in some(&seen.edges) {
+        for edge in some_edges(&seen.edges, ENOUGH) {
             self.add_edge(edge);
         }
-        self.finish()
     }
 
     fn add_point(&mut self, echo: &Echo) {
@@ -83,10 +106,13 @@ impl Rows<'_> {
             self.tally.missed += 1;
             return;
         };
-        let cosine = -near.contact.normal.dot(&direction);
-        let met = self.met(echo, &near.contact, near.off_m, point, cosine);
         let (gate_m, sigma_m) = (self.gates.echo_m, self.gates.coarse_m()[0]);
         self.tally.cost += cost(near.off_m, sigma_m, gate_m, sigma_m * sigma_m);
+        if self.only_costs {
+            return;
+        }
+        let cosine = -near.contact.normal.dot(&direction);
+        let met = self.met(echo, &near.contact, near.off_m, point, cosine);
         if near.off_m.abs() > gate_m {
             self.tally.rejected.push(met);
         } else {
@@ -101,11 +127,6 @@ impl Rows<'_> {
         let moves = self.fill_row(&near.contact, &near.towards, echo.lidar, time_ns);
         self.add_row(&near.contact, moves, near.off_m, weight);
     }
-}
-
-/// Enough of them; an odd stride, for ends of scan lines come by twos.
-fn some<T>(all: &[T]) -> impl Iterator<Item = &T> {
-    all.iter().step_by((all.len() / ENOUGH) | 1)
 }
 
 #[cfg(test)]

@@ -14,8 +14,6 @@ const STRAIN: f64 = 0.1;
 pub struct Solution {
     /// Within what they lay.
     pub gates: Gates,
-    /// Normal matrix of all unknowns.
-    pub(super) matrix: DMatrix<f64>,
     /// Covariance of all unknowns.
     pub(super) covariance: DMatrix<f64>,
     /// Axial strain of each hold, fitted beside all else as if the blade did not keep its length: a
@@ -33,8 +31,6 @@ impl Adjustment {
     pub fn solution(&self, gates: &Gates) -> Result<Solution, BeamError> {
         let (count, holds) = (self.layout.len(), self.problem.holds.len());
         let normal = self.with_strains().normal(gates).0;
-        let mut matrix = normal.matrix.view((0, 0), (count, count)).into_owned();
-        matrix.fill_upper_triangle_with_lower_triangle();
         let factor = Factor::new(normal.matrix).ok_or(BeamError::Singular)?;
         let step = factor.solve(&normal.right);
         let mut spread = DMatrix::zeros(holds, holds);
@@ -46,7 +42,6 @@ impl Adjustment {
         }
         Ok(Solution {
             gates: *gates,
-            matrix,
             covariance: factor.first(count).inverse(),
             strain: step.rows(count, holds).into_owned(),
             strain_covariance: spread,

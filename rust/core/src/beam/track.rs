@@ -11,6 +11,7 @@ use super::clocks::ClockNews;
 use super::echoes::Seen;
 use super::family::{self, Loading};
 use super::layout::RANGES;
+use super::normal::Normal;
 use super::posed::{Posed, knots};
 use super::sections::Rests;
 use super::weights::Tally;
@@ -20,6 +21,9 @@ use crate::error::BeamError;
 const KNOT_NS: i64 = 100_000_000;
 /// Standard deviation of the load against its channel, share of full load.
 const LOAD_SHARE: f64 = 0.02;
+/// At most so many echoes of a stretch are used: what the holds told of lidars and surface leaves more unsure
+/// than their noise.
+const ECHOES: usize = 8000;
 /// Weight of what the holds on both sides tell of a state's own unknowns: it is known to a fifth.
 const OWN_TIGHTNESS: f64 = 25.0;
 
@@ -110,6 +114,7 @@ impl Adjustment {
         modes_m.extend(sway_m);
         let mut blank = self.like(problem, layout);
         blank.free = free;
+        blank.weights.echoes = blank.weights.echoes.min(ECHOES);
         blank.modes_m = modes_m;
         blank.knot_ns = KNOT_NS;
         blank.follows_load = true;
@@ -177,7 +182,12 @@ impl Adjustment {
         for gate in &gates[..gates.len() - 1] {
             self.slope_step(gate)?;
         }
-        let (normal, tally) = self.last_step(&gates[gates.len() - 1])?;
+        // What else the states answer to is asked only for states.
+        let asked = match times_ns.is_empty() {
+            true => self.free.clone(),
+            false => 0..self.layout.len(),
+        };
+        let (normal, tally) = self.last_step(&gates[gates.len() - 1], asked)?;
         let factor = self.free_factor(&normal)?;
         let known = factor.inverse();
         let (knowledge, posed) = (reference.1, self.posed(0));
@@ -187,7 +197,7 @@ impl Adjustment {
                 let rows = at(*time_ns).1;
                 reference
                     .0
-                    .inherited(self, knowledge, between, (&normal, &factor), &rows)
+                    .inherited(self, knowledge, between, (&normal.matrix, &factor), &rows)
             }
             None => Vec::new(),
         };
@@ -209,26 +219,28 @@ impl Adjustment {
         Ok(found)
     }
 
-    /// The last step, with the normal equations over all unknowns, whole, that led to it.
-    pub(super) fn last_step(&mut self, gates: &Gates) -> Result<(DMatrix<f64>, Tally), BeamError> {
-        let free = std::mem::replace(&mut self.free, 0..self.layout.len());
+    /// The last step, with the whole normal equations over all that is `asked` for, that led to it.
+    pub(super) fn last_step(
+        &mut self,
+        gates: &Gates,
+        asked: Range<usize>,
+    ) -> Result<(Normal, Tally), BeamError> {
+        let free = std::mem::replace(&mut self.free, asked);
         let (mut normal, mut tallies) = self.normal(gates);
         self.free = free;
         normal.matrix.fill_upper_triangle_with_lower_triangle();
-        let right = normal.right.rows(self.free.start, self.free.len());
-        let step = self.free_factor(&normal.matrix)?.solve(&right);
+        let first = self.free.start - normal.free.start;
+        let right = normal.right.rows(first, self.free.len());
+        let step = self.free_factor(&normal)?.solve(&right);
         let mut at = self.values.rows_mut(self.free.start, self.free.len());
         at += step;
-        Ok((normal.matrix, tallies.pop().unwrap_or_default()))
+        Ok((normal, tallies.pop().unwrap_or_default()))
     }
 
-    pub(super) fn free_factor(
-        &self,
-        normal: &DMatrix<f64>,
-    ) -> Result<Cholesky<f64, Dyn>, BeamError> {
-        let (first, count) = (self.free.start, self.free.len());
-        let block = normal.view((first, first), (count, count)).into_owned();
-        block.cholesky().ok_or(BeamError::Singular)
+    pub(super) fn free_factor(&self, normal: &Normal) -> Result<Cholesky<f64, Dyn>, BeamError> {
+        let (first, count) = (self.free.start - normal.free.start, self.free.len());
+        let block = normal.matrix.view((first, first), (count, count));
+        block.into_owned().cholesky().ok_or(BeamError::Singular)
     }
 
     /// Covariance of the place and variance of the twist of each section by the data of the stretch, which
