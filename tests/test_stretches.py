@@ -1,5 +1,7 @@
 """Which steps bring a blade to its place, and how the time between holds is cut."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from lidar_deflect.measurement.beam.expected import Expected
@@ -42,7 +44,7 @@ def test_a_blade_that_moves_leaves_no_stage_out() -> None:
 
 
 def test_a_schedule_that_skips_nothing_goes_from_stage_to_stage() -> None:
-    steady = Schedule(DRAWN.first, DRAWN.more)
+    steady = replace(DRAWN, skips=False)
     assert [steady.after(stage, 0.0) for stage in range(3)] == [1, 2, 3]
 
 

@@ -11,10 +11,6 @@ LAST = (0.05, 0.05)
 """Gates of the last steps, in which everything may change."""
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
-NEAR = 0.3
-"""A blade that still moves by more than this share of the next gate is not yet within it ..."""
-PATIENCE = 8
-"""... and so many steps are taken before the gate closes all the same."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +23,10 @@ class Schedule:
         With what steps are taken, in this order.
     more
         How many steps may follow with the last gates until nothing moves any more.
+    near
+        A blade that still moves by more than this share of the next gate is not yet within it ...
+    patience
+        ... and so many steps are taken before the gate closes all the same.
     skips
         Whether stages are left out that let the same change as the last one, in which the blade
         already moved by less than what comes behind them asks for.
@@ -34,15 +34,17 @@ class Schedule:
 
     first: tuple[Step, ...]
     more: int
+    near: float
+    patience: int
     skips: bool = False
 
     def at(self, stage: int) -> Step:
         """Return what a step is taken with; `stage` counts from 0."""
         return self.first[stage] if stage < len(self.first) else (*LAST, "all")
 
-    def is_near(self, stage: int, moved_m: float) -> bool:
-        """Whether a blade that moved so far in a step can go on to the next stage."""
-        return moved_m < NEAR * self.at(stage + 1)[0]
+    def is_over(self, stage: int, steps: int, moved_m: float) -> bool:
+        """Whether a stage is, after so many steps the last of which moved the blade so far."""
+        return self._is_near(stage, moved_m) or steps >= self.patience or stage >= len(self.first)
 
     def after(self, stage: int, moved_m: float) -> int:
         """Return the stage that follows one in which a blade moved so far at last."""
@@ -51,10 +53,14 @@ class Schedule:
             self.skips
             and following < len(self.first) - 1
             and self.at(following)[2] == self.at(stage)[2]
-            and self.is_near(following, moved_m)
+            and self._is_near(following, moved_m)
         ):
             following += 1
         return following
+
+    def _is_near(self, stage: int, moved_m: float) -> bool:
+        """Whether a blade that moved so far can go on to what follows a stage."""
+        return moved_m < self.near * self.at(stage + 1)[0]
 
 
 def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:
@@ -63,10 +69,11 @@ def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:
 
 _LOADS = _stage("loads", (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
 _BLADE = _stage("blade", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
-DRAWN = Schedule((*_LOADS, *_BLADE, *_stage("all", (0.1, 0.1), LAST)), 14, skips=True)
+_ALL = _stage("all", (0.1, 0.1), LAST)
+DRAWN = Schedule((*_LOADS, *_BLADE, *_ALL), more=14, near=0.3, patience=8, skips=True)
 """For a blade with a drawing."""
 
 _FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
-_NEAR = [*[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8]
-UNDRAWN = Schedule((*_FAR, *_LOADS, *_stage("all", *_NEAR)), 40)
+_SURFACE = _stage("surface", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2), (0.1, 0.1))
+UNDRAWN = Schedule((*_FAR, *_LOADS, *_SURFACE, *_ALL), more=20, near=0.05, patience=20)
 """Where no drawing tells prebend and surface: a blade alone would bend to fit the surface."""

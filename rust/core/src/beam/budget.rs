@@ -52,7 +52,7 @@ impl Adjustment {
         let (rows, gates) = (self.value_rows(s_m), &solution.gates);
         let edges = mirrored(self.edges(gates));
         let prior = mirrored(self.prior(gates.stage));
-        let solved = self.solved(&rows, &solution.covariance);
+        let solved = self.answers(&rows, &solution.covariance);
         let (of_edges, of_prior) = rayon::join(|| &edges * &solved, || &prior * &solved);
         let mut groups = vec![vec![0.0; rows.ncols()]; GROUPS.len()];
         for column in 0..rows.ncols() {
@@ -101,7 +101,7 @@ impl Adjustment {
     }
 
     /// Slopes solved by the normal matrix; those of one hold touch few unknowns.
-    fn solved(&self, rows: &DMatrix<f64>, covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    fn answers(&self, rows: &DMatrix<f64>, covariance: &DMatrix<f64>) -> DMatrix<f64> {
         let count = rows.ncols() / self.problem.holds.len();
         let of = |hold: usize| Few::of(rows, hold * count, count).carried(covariance);
         let holds = (0..self.problem.holds.len()).into_par_iter();

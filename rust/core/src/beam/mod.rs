@@ -8,10 +8,12 @@
 
 pub mod adjust;
 pub mod axis;
+mod bill;
 pub mod budget;
 pub mod carry;
 pub mod clocks;
 pub mod common;
+mod descend;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;
@@ -19,6 +21,7 @@ pub mod factor;
 pub mod family;
 mod few;
 pub mod gather;
+mod keep;
 pub mod layout;
 pub mod mesh;
 pub mod near;

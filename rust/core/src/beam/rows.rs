@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M};
+use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M, Stage};
+use super::bill::Bill;
 use super::common;
 use super::echoes::{Echo, Edge};
 use super::layout::{Layout, RANGES, RIG};
@@ -11,7 +12,7 @@ use super::rig::Lidar;
 use super::sight::{Contact, Hit};
 use super::silhouette::{ScanPlane, Silhouette};
 use super::sums::{BOTH, Part, Row, Sums};
-use super::weights::{EdgeMet, Tally, Used, cost, faded, robust};
+use super::weights::{EdgeMet, Tally, Used, faded, robust};
 
 /// Echoes nearer to the end of their run than this are mixed with what lies behind.
 pub(super) const MIXED_ECHOES: u32 = 2;
@@ -82,6 +83,8 @@ pub struct Rows<'a> {
     pub(super) only_costs: bool,
     /// Where the last edge lay, arc length in metres.
     last_edge_m: Option<f64>,
+    pub(super) echo_bill: Bill,
+    edge_bill: Bill,
     pub(super) tally: Tally,
 }
 
@@ -93,6 +96,7 @@ impl<'a> Rows<'a> {
         lidars: &'a [Lidar],
         gates: &'a Gates,
     ) -> Self {
+        let is_judged = adjustment.judges(gates);
         Self {
             lidars,
             gates,
@@ -114,6 +118,8 @@ impl<'a> Rows<'a> {
                 .iter()
                 .map(|noise_m| noise_m.hypot(gates.coarse_m()[0]))
                 .collect(),
+            echo_bill: Bill::new(is_judged),
+            edge_bill: Bill::new(is_judged),
             keeps: gates.is_fine() || !adjustment.follows_load,
             only_costs: false,
             last_edge_m: None,
@@ -124,8 +130,26 @@ impl<'a> Rows<'a> {
 
     /// All rows, and what became of the data.
     pub fn collect(mut self) -> (Part, Tally) {
+        self.look();
+        self.finish()
+    }
+
+    /// What the data cost.
+    pub(super) fn cost(mut self) -> f64 {
+        self.only_costs = true;
+        self.look();
+        self.charge();
+        self.tally.cost
+    }
+
+    fn charge(&mut self) {
+        self.tally.cost += self.echo_bill.total(self.tally.missed);
+        self.tally.cost += self.edge_bill.total(self.tally.edges_left_out[1]);
+    }
+
+    fn look(&mut self) {
         if self.gates.is_search() {
-            return self.collect_near();
+            return self.look_near();
         }
         let seen = &self.adjustment.problem.holds[self.hold].seen;
         let (echoes, edges) = self.most();
@@ -139,7 +163,6 @@ impl<'a> Rows<'a> {
         for edge in some_edges(&seen.edges, edges) {
             self.add_edge(edge);
         }
-        self.finish()
     }
 
     /// How many echoes and how many edges are used: few to come near. Without a drawing steps are held back
@@ -162,7 +185,8 @@ impl<'a> Rows<'a> {
         self.finish().0
     }
 
-    pub(super) fn finish(self) -> (Part, Tally) {
+    pub(super) fn finish(mut self) -> (Part, Tally) {
+        self.charge();
         let free = &self.adjustment.free;
         let state = self.adjustment.state_at(self.hold).into_iter().enumerate();
         let (places, unknowns): (Vec<_>, Vec<_>) = state.filter(|(_, i)| free.contains(i)).unzip();
@@ -184,6 +208,9 @@ impl<'a> Rows<'a> {
         let s_m = self.arc_m(&hit.contact);
         let upright = faded(hit.cosine, FLAT_COSINE);
         if echo.from_end < MIXED_ECHOES || upright == 0.0 {
+            if upright == 0.0 {
+                self.echo_bill.add_faded();
+            }
             self.tally.unfit += 1;
             return Some(s_m);
         }
@@ -195,7 +222,14 @@ impl<'a> Rows<'a> {
         let sigma = (noise_m * noise_m + own_m * own_m).sqrt();
         let point = lidar.origin + direction * (hit.range_m + residual);
         let met = self.met(echo, &hit.contact, residual, point, hit.cosine);
-        if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
+        let variance = self.variance_m2(&met, noise_m);
+        let gate_m = self.gates.echo_m.max(4.0 * sigma);
+        self.echo_bill
+            .add(residual, sigma, gate_m, variance, upright);
+        if self.only_costs {
+            return Some(s_m);
+        }
+        if residual.abs() > gate_m {
             if self.keeps {
                 self.tally.rejected.push(met);
             }
@@ -204,14 +238,20 @@ impl<'a> Rows<'a> {
         if self.keeps {
             self.tally.used.push(met);
         }
-        let alone = (hit.cosine / noise_m).powi(2);
+        let weight = robust(residual, sigma, self.gates.echo_m) / variance;
+        self.add_hit(echo, &hit, time_ns, residual, upright * weight);
+        Some(s_m)
+    }
+
+    /// Variance of an echo among those of its patch, by the noise of its range.
+    fn variance_m2(&self, met: &Used, noise_m: f64) -> f64 {
+        let weights = &self.adjustment.weights;
+        let alone = (met.cosine / noise_m).powi(2);
         let factor = match weights.common.get(self.hold) {
             Some(common) => common.echo_factor(met.patch, weights.surface_m, alone),
             None => 1.0 + weights.surface_m * weights.surface_m * alone,
         };
-        let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
-        self.add_hit(echo, &hit, time_ns, residual, upright * weight);
-        Some(s_m)
+        noise_m * noise_m * factor
     }
 
     /// An echo as it met the model at a contact.
@@ -398,6 +438,7 @@ impl<'a> Rows<'a> {
     ) {
         let firm = firmness(silhouette, self.gates);
         if firm == 0.0 {
+            self.edge_bill.add_faded();
             self.tally.edges_left_out[0] += 1;
             return;
         }
@@ -422,7 +463,8 @@ impl<'a> Rows<'a> {
         let gate_rad = (self.gates.edge_m / silhouette.range_m).max(4.0 * sigma);
         let depth_m = (edge.range_m - silhouette.range_m).abs();
         let variance = sigma_rad * sigma_rad + grid;
-        self.tally.cost += cost(residual, sigma, gate_rad, variance);
+        self.edge_bill
+            .add(residual, sigma, gate_rad, variance, firm);
         if self.only_costs {
             return;
         }
@@ -463,7 +505,7 @@ fn range_slopes_m(cosine: f64) -> [f64; 2] {
 
 /// Share of its weight that an edge keeps: less where the surface turns away slowly or is seen edge-on.
 fn firmness(silhouette: &Silhouette, gates: &Gates) -> f64 {
-    if !gates.is_search() {
+    if gates.stage >= Stage::Surface {
         return faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE);
     }
     let coarse_m = gates.coarse_m()[1];
@@ -511,8 +553,21 @@ mod tests {
     #[test]
     fn slopes_of_all_unknowns_are_those_of_the_residuals() {
         let adjustment = sample::adjustment(0.02);
+        let unknowns = (0..adjustment.layout.len()).step_by(7);
+        expect_slopes(&adjustment, unknowns, 0.02);
+    }
+
+    #[test]
+    fn so_are_those_of_a_surface_without_a_drawing() {
+        let mut adjustment = sample::undrawn();
+        let surface = adjustment.layout.shape_at();
+        adjustment.shift(surface, 0.05);
+        let unknowns = surface..surface + adjustment.problem.shape.waves_from();
+        expect_slopes(&adjustment, unknowns, 0.002);
+    }
+
+    fn expect_slopes(adjustment: &Adjustment, unknowns: impl Iterator<Item = usize>, step: f64) {
         let ((normal, _), prior) = (adjustment.normal(&WIDE), adjustment.prior(WIDE.stage));
-        let step = 0.02;
         let cost = |unknown: usize, change: f64| {
             let mut moved = adjustment.clone();
             moved.shift(unknown, change);
@@ -520,7 +575,7 @@ mod tests {
         };
         let rig = adjustment.layout.lidar_at(0)..adjustment.layout.shape_at();
         let scale = normal.right.amax();
-        for unknown in (0..adjustment.layout.len()).step_by(7) {
+        for unknown in unknowns {
             // Unknowns of the lidars have units of their own.
             let step = if rig.contains(&unknown) { 1e-5 } else { step };
             let slope = (cost(unknown, step) - cost(unknown, -step)) / (2.0 * step);

@@ -3,17 +3,18 @@
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::{Adjustment, Gates, Stage};
 use super::echoes::Echo;
 use super::near::Near;
 use super::rows::{MIXED_ECHOES, Rows, some, some_edges};
 use super::step::Step;
-use super::sums::Part;
-use super::weights::{Tally, cost, robust};
+use super::weights::{Tally, robust};
 use crate::error::BeamError;
 
-/// So many echoes of a hold suffice, and so many edges.
-const ENOUGH: usize = 2000;
+/// So many echoes of a hold suffice, and so many edges; so many echoes tell as much as one.
+const OF_BLADE: (usize, f64) = (2000, 1.0);
+/// The same where the surface is learned: neighbours are off alike while it is not known.
+const OF_SURFACE: (usize, f64) = (8000, 3.0);
 /// A step that does no good is shortened to this share, at most so often.
 const SHORTENED: (f64, usize) = (0.4, 6);
 
@@ -31,8 +32,7 @@ impl Adjustment {
 
     fn sought(&mut self, gates: &Gates) -> Result<Step, BeamError> {
         let (mut step, largest, tallies) = self.wanted(gates)?;
-        let of_data = tallies.iter().map(|tally| tally.cost).sum::<f64>();
-        let (from, before) = (self.axes(), self.surprise(gates.stage) + of_data);
+        let (from, before) = (self.axes(), self.cost(gates, &tallies));
         let has_gone = (0..SHORTENED.1).any(|_| {
             let is_better = self.is_better(&step, gates, before);
             step *= SHORTENED.0;
@@ -47,19 +47,28 @@ impl Adjustment {
     }
 
     /// Goes a step, and comes back where the data do not cost less there.
-    fn is_better(&mut self, step: &DVector<f64>, gates: &Gates, before: f64) -> bool {
+    pub(super) fn is_better(&mut self, step: &DVector<f64>, gates: &Gates, before: f64) -> bool {
         let spot = self.spot();
         self.values += step;
         self.settle_in(step);
-        let is_better = self.linearise().is_ok() && self.cost(gates) < before;
+        let solved = match self.is_learned(gates) {
+            true => self.linearise_kept(),
+            false => self.linearise(),
+        };
+        let is_better = solved.is_ok() && self.cost_here(gates) < before;
         if !is_better {
             self.return_to(spot);
         }
         is_better
     }
 
-    /// What the unknowns cost, by the data and by what was known before.
-    fn cost(&self, gates: &Gates) -> f64 {
+    /// What the unknowns cost, by what became of the data and by what was known before.
+    pub(super) fn cost(&self, gates: &Gates, tallies: &[Tally]) -> f64 {
+        self.surprise(gates.stage) + tallies.iter().map(|tally| tally.cost).sum::<f64>()
+    }
+
+    /// The same without rows.
+    fn cost_here(&self, gates: &Gates) -> f64 {
         let lidars = self.lidars();
         let of = |hold| Rows::new(self, hold, &lidars, gates).cost();
         let holds = (0..self.problem.holds.len()).into_par_iter();
@@ -69,30 +78,22 @@ impl Adjustment {
 }
 
 impl Rows<'_> {
-    /// What the data cost.
-    fn cost(mut self) -> f64 {
-        self.only_costs = true;
-        self.look();
-        self.tally.cost
-    }
-
-    /// Rows by distances of points, and what became of the data.
-    pub(super) fn collect_near(mut self) -> (Part, Tally) {
-        self.look();
-        self.finish()
-    }
-
-    fn look(&mut self) {
+    /// Looks at the data by distances of points.
+    pub(super) fn look_near(&mut self) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        for echo in some(&seen.echoes, ENOUGH) {
-            self.add_point(echo);
+        let (enough, alike) = match self.gates.stage {
+            Stage::Surface => OF_SURFACE,
+            _ => OF_BLADE,
+        };
+        for echo in some(&seen.echoes, enough) {
+            self.add_point(echo, alike);
         }
-        for edge in some_edges(&seen.edges, ENOUGH) {
+        for edge in some_edges(&seen.edges, enough) {
             self.add_edge(edge);
         }
     }
 
-    fn add_point(&mut self, echo: &Echo) {
+    fn add_point(&mut self, echo: &Echo, alike: f64) {
         if echo.from_end < MIXED_ECHOES {
             self.tally.unfit += 1;
             return;
@@ -107,7 +108,9 @@ impl Rows<'_> {
             return;
         };
         let (gate_m, sigma_m) = (self.gates.echo_m, self.gates.coarse_m()[0]);
-        self.tally.cost += cost(near.off_m, sigma_m, gate_m, sigma_m * sigma_m);
+        let variance = sigma_m * sigma_m * alike;
+        self.echo_bill
+            .add(near.off_m, sigma_m, gate_m, variance, 1.0);
         if self.only_costs {
             return;
         }
@@ -117,12 +120,12 @@ impl Rows<'_> {
             self.tally.rejected.push(met);
         } else {
             self.tally.used.push(met);
-            self.add_near(echo, &near, sigma_m);
+            self.add_near(echo, &near, sigma_m, variance);
         }
     }
 
-    fn add_near(&mut self, echo: &Echo, near: &Near, sigma_m: f64) {
-        let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / (sigma_m * sigma_m);
+    fn add_near(&mut self, echo: &Echo, near: &Near, sigma_m: f64, variance: f64) {
+        let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / variance;
         let time_ns = self.time_ns(echo.lidar, echo.time_ns);
         let moves = self.fill_row(&near.contact, &near.towards, echo.lidar, time_ns);
         self.add_row(&near.contact, moves, near.off_m, weight);
@@ -131,7 +134,6 @@ impl Rows<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::adjust::Stage;
     use super::super::sample;
     use super::*;
 
