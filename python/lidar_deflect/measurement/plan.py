@@ -43,6 +43,10 @@ WALL_MARGIN_M = 1.0
 MIN_BLADE_POINTS = 100
 OUTLIERS_PERCENT = 0.5
 
+_ROWS = 16_384
+"""Points that are turned at a time: beyond, OpenBLAS shares the product out to threads, which may
+take fifty times as long for rows of three."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -116,7 +120,9 @@ def make_plan(config: Config, calibration: Calibration, clouds: Mapping[str, Hol
 
 
 def _to_world(xyz: NDArray[np.float32], pose: Floats) -> NDArray[np.float32]:
-    moved = xyz @ pose[:3, :3].T.astype(np.float32)
+    turn, moved = pose[:3, :3].T.astype(np.float32), np.empty_like(xyz)
+    for first in range(0, len(xyz), _ROWS):
+        np.matmul(xyz[first : first + _ROWS], turn, out=moved[first : first + _ROWS])
     for axis, step_m in enumerate(pose[:3, 3].astype(np.float32)):
         moved[:, axis] += step_m  # column by column: rows of three are slow in numpy
     return np.asarray(moved, dtype=np.float32)
