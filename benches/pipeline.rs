@@ -15,7 +15,7 @@ use lidar_deflect_core::paper::passthrough::PassThrough;
 use lidar_deflect_core::paper::reader::{FramePlan, FrameReader};
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::{Plane, TipLimits};
-use lidar_deflect_core::stream::ScanReport;
+use lidar_deflect_core::stream::{Reading, ScanReport};
 use lidar_deflect_core::time::Timestamp;
 use nalgebra::Vector3;
 use std::hint::black_box;

@@ -4,7 +4,9 @@ mod columns;
 mod cut;
 mod describe;
 pub mod feed;
+mod hold;
 mod points;
+pub mod reading;
 mod sweeps;
 
 use std::path::PathBuf;
@@ -206,6 +208,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sweeps::SweepIterator>()?;
     module.add_class::<points::PointIterator>()?;
     module.add_function(wrap_pyfunction!(cut::cut_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(hold::hold_echoes, module)?)?;
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;
