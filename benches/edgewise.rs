@@ -151,7 +151,10 @@ pub fn by_batches(bytes: &[u8], mut take: impl FnMut(&DatagramBatch) + Send) {
 
 /// Who sends what in a capture.
 pub fn scan(bytes: &[u8]) -> ScanReport {
+    let mut reader = DatagramReader::new(bytes).unwrap();
     let mut scan = Scan::new(ScanOptions::default());
-    by_batches(bytes, |batch| scan.push_batch(batch));
+    while let Some(datagram) = reader.next().unwrap() {
+        scan.push(&datagram);
+    }
     scan.finish()
 }

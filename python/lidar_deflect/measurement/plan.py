@@ -100,11 +100,7 @@ class Plan:
 
 def make_plan(config: Config, calibration: Calibration, clouds: Mapping[str, HoldCloud]) -> Plan:
     """Settle what the configuration leaves open, from the unloaded hold."""
-    world = {
-        lidar: _to_world(cloud.xyz, calibration.pose(lidar).world_from_sensor)
-        for lidar, cloud in clouds.items()
-    }
-    blade = _near_blade(config, calibration, world)
+    blade = _near_blade(config, calibration, clouds)
     leading_edge, warnings = _chord_direction(config, blade)
     return Plan(
         box_m=_box(config, blade),
@@ -129,12 +125,13 @@ def _to_world(xyz: NDArray[np.float32], pose: Floats) -> NDArray[np.float32]:
 
 
 def _near_blade(
-    config: Config, calibration: Calibration, world: Mapping[str, NDArray[np.float32]]
+    config: Config, calibration: Calibration, clouds: Mapping[str, HoldCloud]
 ) -> Floats:
     """Points of the unloaded hold that lie near the z axis and well above the ground."""
     reach = max(NEAR_AXIS_MIN_M, NEAR_AXIS * config.blade.length_m)
     parts = []
-    for lidar, xyz in world.items():
+    for lidar, cloud in clouds.items():
+        xyz = _to_world(cloud.xyz, calibration.pose(lidar).world_from_sensor)
         ground = calibration.pose(lidar).evidence.get("ground_height_m")
         floor = -reach if ground is None else max(-reach, float(ground) + CLEARANCE_M)
         near = (
