@@ -67,7 +67,7 @@ def drawing_of(inputs: Inputs) -> Drawing:
         at_m, outlines = generic.outlines(blade)
         native = _native_of(inputs.config, sides, generic.stations(blade), at_m, outlines)
         shape = (0.1, 0.05, max(setting_rad, 0.03), 0.02, blade.axis_fraction_u, 0.02, 3.0, 2.0)
-        return Drawing(native, (0.25, 0.7, 0.0, 4e-4, 2e-3, COUPLING), shape, "generic")
+        return Drawing(native, (0.4, 0.7, 0.8, 4e-4, 2e-3, COUPLING), shape, "generic")
     outlines = np.stack([given.contours.x_c, given.contours.y_c], axis=2)
     native = _native_of(inputs.config, sides, columns, given.contours.s_m, outlines)
     shape = (0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002, 9.0, 1.0)

@@ -18,42 +18,29 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SHARE = np.array([0.0, 0.05, 0.12, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0])
-CHORD = np.array(
-    [
-        0.043,
-        0.044,
-        0.049,
-        0.053,
-        0.049,
-        0.044,
-        0.039,
-        0.033,
-        0.028,
-        0.023,
-        0.0175,
-        0.013,
-        0.009,
-        0.002,
-    ]
-)
-"""Chord over length."""
-TWIST_DEG = np.array([14.0, 13.5, 12.5, 10.5, 8.0, 6.0, 5.0, 3.8, 2.6, 1.6, 0.5, -0.5, -1.0, -1.5])
+CHORD_M = np.array([4.7, 4.8, 5.3, 5.5, 5.4, 4.8, 4.2, 3.5, 2.9, 2.3, 1.75, 1.4, 0.95, 0.35])
+"""Chord of a blade of `LENGTH_M`; it grows with `CHORD_GROWS` of the length."""
+TWIST_DEG = np.array([15.5, 14.5, 12.5, 9.5, 6.2, 4.7, 3.1, 1.5, 0.0, -1.8, -2.8, -2.9, -2.7, -2.4])
 THICKNESS = np.array(
-    [1.0, 0.95, 0.75, 0.5, 0.39, 0.34, 0.3, 0.27, 0.25, 0.23, 0.21, 0.195, 0.185, 0.18]
+    [1.0, 0.92, 0.6, 0.38, 0.32, 0.295, 0.27, 0.25, 0.23, 0.215, 0.205, 0.2, 0.195, 0.19]
 )
 """Thickness over chord."""
+PREBEND = -0.03 * SHARE**4
+"""Over the length."""
 LOG_EDGE = np.array(
-    [0.0, -0.15, -0.35, -0.58, -0.72, -0.88, -1.02, -1.2, -1.47, -1.8, -2.35, -2.8, -3.7, -5.0]
+    [0.0, -0.2, -0.42, -0.58, -0.73, -0.87, -1.07, -1.35, -1.7, -2.1, -2.6, -3.0, -3.8, -4.9]
 )
 LOG_FLAP = np.array(
-    [0.0, -0.2, -0.5, -0.82, -1.06, -1.25, -1.45, -1.7, -1.92, -2.2, -2.75, -3.3, -4.6, -6.0]
+    [0.0, -0.2, -0.57, -0.9, -1.12, -1.3, -1.57, -1.92, -2.3, -2.75, -3.35, -3.85, -4.75, -6.0]
 )
 LOG_TORSION = np.array(
-    [-0.23, -0.4, -0.8, -1.6, -2.25, -2.5, -2.7, -2.9, -3.1, -3.35, -3.75, -4.1, -4.8, -6.3]
+    [-0.35, -0.55, -0.97, -1.45, -1.85, -2.1, -2.4, -2.75, -3.2, -3.6, -4.1, -4.5, -5.35, -6.4]
 )
 """Decades of stiffness under `ROOT_NM2`."""
-ROOT_NM2, ROOT_LENGTH_M = 1.2e11, 110.0
-"""Bending stiffness of the root of a blade of this length; it grows with the fourth power."""
+ROOT_NM2, LENGTH_M = 1.2e11, 110.0
+"""Bending stiffness of the root of a blade of this length."""
+CHORD_GROWS, STIFFNESS_GROWS = 0.25, 2.8
+"""Exponents of the length."""
 
 HALF_POINTS = 36
 
@@ -61,13 +48,14 @@ HALF_POINTS = 36
 def stations(blade: Blade) -> Floats:
     """Columns of the drawing as the compiled core wants them, shape (n, 8)."""
     length = blade.length_m
-    scale = ROOT_NM2 * (length / ROOT_LENGTH_M) ** 4
+    longer = length / LENGTH_M
+    scale = ROOT_NM2 * longer**STIFFNESS_GROWS
     return np.column_stack(
         [
             SHARE * length,
-            CHORD * length,
+            CHORD_M * longer**CHORD_GROWS,
             np.radians(TWIST_DEG),
-            np.zeros_like(SHARE),
+            PREBEND * length,
             np.where(
                 SHARE < 0.2, 0.5 + (blade.axis_fraction - 0.5) * SHARE / 0.2, blade.axis_fraction
             ),

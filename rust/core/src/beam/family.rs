@@ -32,8 +32,8 @@ pub enum Kind {
     Load,
     /// Weight, relative, as a function along the span.
     Weight(usize),
-    /// Compliance, relative: 0 edgewise, 1 flapwise, 2 torsion, 3 coupling of both bendings; as a
-    /// function along the span.
+    /// Compliance: logarithm of the edgewise (0), flapwise (1) and torsional (2) one, or coupling of both
+    /// bendings (3); as a function along the span.
     Soft {
         /// Which of the four.
         which: usize,
@@ -191,8 +191,11 @@ pub fn add(physics: &mut Physics, mesh: &Mesh, kind: Kind, value: f64) {
         }
         Kind::Couple { saddle } => physics.couples_nm[saddle] += value,
         Kind::Weight(mode) => elements.for_each(|e| physics.weight[e] += value * wave(e, mode)),
-        Kind::Soft { which, mode } => {
+        Kind::Soft { which, mode } if which == COUPLING => {
             elements.for_each(|e| physics.soft[which][e] += value * wave(e, mode));
+        }
+        Kind::Soft { which, mode } => {
+            elements.for_each(|e| physics.soft[which][e] *= (value * wave(e, mode)).exp());
         }
         Kind::Free { axis, mode } => {
             elements.for_each(|e| physics.free[e][axis] += value * wave(e, mode));

@@ -41,7 +41,7 @@ impl Adjustment {
         };
         match kind {
             Some(Kind::Force { .. } | Kind::Weight(0)) => Stage::Loads,
-            Some(Kind::Free { mode: 0 | 1, .. }) if self.is_vague() => Stage::Loads,
+            Some(Kind::Free { mode: 0 | 1, .. } | Kind::Prebend) if self.is_vague() => Stage::Loads,
             _ => Stage::Blade,
         }
     }
