@@ -150,6 +150,7 @@ pub struct WindowTaker {
     length_ns: i64,
     open: Option<Window>,
     ready: Vec<Window>,
+    usual: usize, // echoes of the last window: as much room is made for the next
 }
 
 impl WindowTaker {
@@ -162,6 +163,7 @@ impl WindowTaker {
             length_ns: length_ns.max(1),
             open: None,
             ready: Vec::new(),
+            usual: 0,
         }
     }
 
@@ -176,12 +178,14 @@ impl WindowTaker {
     fn window(&mut self, sweep: &Sweep) -> &mut Window {
         let number = (sweep.start.0 - self.start_ns).div_euclid(self.length_ns);
         if let Some(over) = self.open.take_if(|open| open.number != number) {
+            self.usual = over.cell.len();
             self.ready.push(over);
         }
+        let room = self.usual + self.usual / 16;
         self.open.get_or_insert_with(|| Window {
             number,
-            cell: Vec::new(),
-            xyz_m: Vec::new(),
+            cell: Vec::with_capacity(room),
+            xyz_m: Vec::with_capacity(room),
             from_ns: sweep.start.0,
             to_ns: sweep.end.0,
         })

@@ -47,6 +47,9 @@ fn echo_cells<'py>(
     Ok(cells.into_pyarray(py))
 }
 
+/// Numbers of echoes, and sums over them.
+type CellSums<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>);
+
 /// Numbers of echoes by cell, (size,), and sums of their places, (3, size).
 #[pyfunction]
 fn cell_positions<'py>(
@@ -54,7 +57,7 @@ fn cell_positions<'py>(
     cells: PyReadonlyArray1<'py, i64>,
     xyz: PyReadonlyArray2<'py, f32>,
     size: usize,
-) -> BorderResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>)> {
+) -> BorderResult<CellSums<'py>> {
     let cells = arrays::values("cells", &cells)?;
     let xyz = arrays::points("xyz", &xyz)?;
     arrays::expect_rows("xyz", xyz.len(), cells.len())?;

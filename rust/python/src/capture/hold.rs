@@ -29,13 +29,16 @@ pub fn hold_echoes<'py>(
     stop_ns: i64,
     threads: Option<usize>,
 ) -> BorderResult<Vec<Columns<'py>>> {
+    let (start, stop) = (Timestamp(start_ns), Timestamp(stop_ns));
     let lidar = |number: &usize| {
         let options = SweepOptions {
-            start: Some(Timestamp(start_ns)),
-            stop: Some(Timestamp(stop_ns)),
+            start: Some(start),
+            stop: Some(stop),
             ..SweepOptions::of(&[*number], &[0.0])
         };
-        (options, HoldEchoes::default())
+        let info = scan.report.lidars.get(*number);
+        let echoes = info.map(|info| HoldEchoes::of(info, start, stop));
+        (options, echoes.unwrap_or_default())
     };
     let beside = Beside::new(&scan.report, lidars.iter().map(lidar))?;
     let mut feed = ReadingFeed::open(py, &scan.paths, beside)?;
