@@ -13,7 +13,7 @@ from lidar_deflect.measurement import paper
 from lidar_deflect.measurement.beam.clocks import unknown
 from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
 from lidar_deflect.measurement.beam.rig import RigPrior, rig_prior
-from lidar_deflect.measurement.beam.schedule import DRAWN, PATIENCE, SETTLED, UNDRAWN
+from lidar_deflect.measurement.beam.schedule import DRAWN, SETTLED, UNDRAWN
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -193,8 +193,7 @@ def _settle(
     while stage < stages or (told["largest"] > SETTLED and stage < last):
         told = native.step(*schedule.at(stage))
         steps, tries = steps + 1, tries + 1
-        is_late = stage >= stages or tries >= PATIENCE
-        if is_late or schedule.is_near(stage, told["moved_m"]):
+        if schedule.is_over(stage, tries, told["moved_m"]):
             stage, tries = stage + 1, 0
         if listener:
             listener(stage, last)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,16 +32,19 @@ EDGE_STEPS = 0.6
 """Edges that scatter by more steps between shots than this are not those of the blade."""
 EDGES_LOST = 0.4
 """More of the hard edges than this share lie beyond the gate: the silhouette is another one."""
-EDGE_DEVIATIONS, EDGE_MEAN_STEPS = 5.0, 0.2
-"""A group of edges beyond both, deviations of its mean and steps, is not the silhouette."""
+EDGE_DEVIATIONS, EDGE_MEAN_STEPS, EDGE_MEAN_GENERIC_STEPS = 5.0, 0.2, 0.5
+"""A group of edges beyond both, deviations of its mean and steps, is not the silhouette; without a
+drawing its shape is known less well."""
 MEAN_M = 0.006
 """Mean residual of a lidar in a hold beyond this contradicts the model."""
 COUNTED = 0.5
 """Fewer of the echoes that meet the model than this share count: the blade lies elsewhere."""
 SETTLED = 0.5
 """A last step of more than this share of a prior deviation has not settled."""
-STRAIN, STRAIN_DEVIATIONS = 5e-4, 3.0
-"""A free axial strain beyond both contradicts a blade that keeps its length."""
+DEVIATIONS = 3.0
+"""What lies within so many of its own deviations contradicts nothing."""
+STRAIN = 5e-4
+"""A free axial strain beyond this and its deviations contradicts a blade that keeps its length."""
 TURN_BACK_RAD, TURN_BACK_SHARE = 2e-3, 0.02
 """The blade may bend back by so little outboard of the last load, or by this share of its turn: the
 middle of a chord that tapers goes back a little where its axis goes on."""
@@ -142,10 +146,12 @@ def _edges(inputs: Inputs, solved: Solved) -> Iterator[Check]:
         text = f"{100.0 * share:.0f} %"
         limit = f"{100.0 * EDGES_LOST:g} %"
         yield Check("edges let go", text, limit, share <= EDGES_LOST, name)
-        yield from _group(inputs, edges, name)
+        is_drawn = solved.source == "drawing"
+        most_steps = EDGE_MEAN_STEPS if is_drawn else EDGE_MEAN_GENERIC_STEPS
+        yield from _group(inputs, edges, name, most_steps)
 
 
-def _group(inputs: Inputs, edges: Floats, name: str) -> Iterator[Check]:
+def _group(inputs: Inputs, edges: Floats, name: str, most_steps: float) -> Iterator[Check]:
     """Find the group of edges, by lidar and side, that lies farthest beside the silhouette."""
     found = []
     for number, lidar in enumerate(inputs.lidars):
@@ -154,13 +160,13 @@ def _group(inputs: Inputs, edges: Floats, name: str) -> Iterator[Check]:
             if len(own) >= MIN_EDGES:
                 mean, spread = float(np.mean(own[:, 2])), float(np.std(own[:, 2]))
                 off = abs(mean) / max(spread / np.sqrt(len(own)), 1e-9)
-                found.append((off if abs(mean) > EDGE_MEAN_STEPS else 0.0, mean, lidar, word))
+                found.append((off if abs(mean) > most_steps else 0.0, mean, lidar, word))
     if found:
         off, mean, lidar, word = max(found, key=lambda each: (each[0], abs(each[1])))
         yield Check(
             "mean of edges",
             f"{mean:+.2f} steps",
-            f"{EDGE_MEAN_STEPS:g} steps or {EDGE_DEVIATIONS:g} deviations",
+            f"{most_steps:g} steps or {EDGE_DEVIATIONS:g} deviations",
             off <= EDGE_DEVIATIONS,
             f"{name}, lidar {lidar}, {word}",
         )
@@ -175,7 +181,7 @@ def _strain(solved: Solved) -> Iterator[Check]:
         if number:
             pick[0] = -1.0
         value, u = float(pick @ strain), float(pick @ covariance @ pick) ** 0.5
-        limit = max(STRAIN, STRAIN_DEVIATIONS * u)
+        limit = max(STRAIN, DEVIATIONS * u)
         yield Check(
             "free axial strain" if number else "free axial strain (length of the blade)",
             f"{1e6 * value:+.0f} +- {1e6 * u:.0f} ppm",
@@ -198,11 +204,16 @@ def _turn(
         if number == 0 or len(outside) < 3 or total < 0.05:
             continue
         tip = moved[number, outside[-1]]
-        along = moved[number, outside] @ (tip / np.linalg.norm(tip))
-        slope = np.diff(along) / np.diff(s_m[outside])
+        ahead = tip / np.linalg.norm(tip)
+        slopes = np.zeros((len(outside) - 1, len(s_m)))
+        for place, (one, other) in enumerate(pairwise(outside)):
+            slopes[place, [one, other]] = np.array([-1.0, 1.0]) / (s_m[other] - s_m[one])
+        slope = slopes @ moved[number] @ ahead
         back = np.maximum.accumulate(slope) - slope
         worst = int(np.argmax(back))
-        limit = max(TURN_BACK_RAD, TURN_BACK_SHARE * float(slope.max()))
+        turned = slopes[np.argmax(slope[: worst + 1])] - slopes[worst]
+        u_rad = covariance.change_variance_m2(number, np.outer(turned, ahead)) ** 0.5
+        limit = max(TURN_BACK_RAD, TURN_BACK_SHARE * float(slope.max()), DEVIATIONS * u_rad)
         yield Check(
             "turns back outboard of the last load",
             f"{1e3 * back[worst]:.2f} mrad",

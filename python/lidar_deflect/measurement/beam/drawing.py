@@ -14,7 +14,7 @@ from lidar_deflect.measurement.beam import generic
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from lidar_deflect.config import Config
+    from lidar_deflect.config import Blade, Config
     from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
@@ -41,12 +41,13 @@ class Drawing:
     blade
         The blade of the compiled core.
     trust
-        Prior deviations of stiffness, weight, prebend (relative), stress-free curvature (rad/m),
-        the root's rotation (rad) and the coupling of both bendings (share of their stiffness).
+        Number of functions along the span, and prior deviations of stiffness, weight, prebend
+        (relative), stress-free curvature (rad/m), the root's rotation (rad) and the coupling of
+        both bendings (share of their stiffness).
     shape_trust
-        Of chord and its waves (relative), setting angle and waves of twist (rad), axis (chord
-        lengths) and waves of the surface (m); distances of the knots of chord and twist, and of
-        waves (m).
+        Of chord and its waves (relative; at the tip the latter grow by a factor), setting angle and
+        waves of twist (rad), axis (chord lengths), contour (share of what blades differ by) and
+        waves of the surface (m); distances of the knots of chord and twist, and of waves (m).
     source
         ``drawing`` or ``generic``.
     """
@@ -61,17 +62,32 @@ def drawing_of(inputs: Inputs) -> Drawing:
     """Take the drawing, else a blade as blades are."""
     blade, sides = inputs.config.blade, sides_of(inputs)
     given = geometry.read_geometry(blade)
-    setting_rad = float(np.radians(blade.setting_u_deg))
     columns = None if given is None else _columns(given.stations)
     if given is None or given.contours is None or columns is None:
         at_m, outlines = generic.outlines(blade)
         native = _native_of(inputs.config, sides, generic.stations(blade), at_m, outlines)
-        shape = (0.1, 0.05, max(setting_rad, 0.03), 0.02, blade.axis_fraction_u, 0.02, 3.0, 2.0)
-        return Drawing(native, (0.4, 0.7, 0.8, 4e-4, 2e-3, COUPLING), shape, "generic")
+        return Drawing(native, GENERIC_TRUST, _generic_shape(blade), "generic")
     outlines = np.stack([given.contours.x_c, given.contours.y_c], axis=2)
     native = _native_of(inputs.config, sides, columns, given.contours.s_m, outlines)
-    shape = (0.004, 0.001, setting_rad, 0.0005, 0.002, 0.002, 9.0, 1.0)
-    return Drawing(native, (0.05, 0.5, 0.05, 1.5e-5, 1e-3, COUPLING), shape, "drawing")
+    return Drawing(native, TRUST, _drawn_shape(blade), "drawing")
+
+
+TRUST = (5, 0.05, 0.5, 0.05, 1.5e-5, 1e-3, COUPLING)
+GENERIC_TRUST = (10, 0.3, 0.7, 0.8, 3e-4, 2e-3, COUPLING)
+"""More functions along the span: what is seen of the outer blade tells little of the inner."""
+AXIS_U = 0.03
+"""Without a drawing the axis may not go farther from where it is said to be: twist moves it, and
+errors of the contour would pass for that."""
+
+
+def _drawn_shape(blade: Blade) -> tuple[float, ...]:
+    return (0.004, 0.001, 1.0, np.radians(blade.setting_u_deg), 0.0005, 0.002, 0.0, 0.002, 9.0, 1.0)
+
+
+def _generic_shape(blade: Blade) -> tuple[float, ...]:
+    setting_rad = max(np.radians(blade.setting_u_deg), 0.03)
+    axis = min(blade.axis_fraction_u, AXIS_U)
+    return (0.2, 0.1, 3.0, setting_rad, 0.01, axis, 0.7, 0.006, 0.8, 2.0)
 
 
 def _native_of(

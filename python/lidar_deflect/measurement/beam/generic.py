@@ -18,15 +18,18 @@ if TYPE_CHECKING:
     Floats = NDArray[np.float64]
 
 SHARE = np.array([0.0, 0.05, 0.12, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 1.0])
-CHORD_M = np.array([4.7, 4.8, 5.3, 5.5, 5.4, 4.8, 4.2, 3.5, 2.9, 2.3, 1.75, 1.4, 0.95, 0.35])
+CHORD_M = np.array([4.7, 4.8, 5.3, 5.5, 5.4, 4.8, 4.2, 3.5, 2.9, 2.3, 1.75, 1.4, 1.0, 0.15])
 """Chord of a blade of `LENGTH_M`; it grows with `CHORD_GROWS` of the length."""
+TIP_SHARE = np.array([0.985, 0.99, 0.995, 0.998])
+TIP_CHORD_M = np.array([0.93, 0.82, 0.62, 0.4])
+"""The same where the tip is round."""
 TWIST_DEG = np.array([15.5, 14.5, 12.5, 9.5, 6.2, 4.7, 3.1, 1.5, 0.0, -1.8, -2.8, -2.9, -2.7, -2.4])
 THICKNESS = np.array(
     [1.0, 0.92, 0.6, 0.38, 0.32, 0.295, 0.27, 0.25, 0.23, 0.215, 0.205, 0.2, 0.195, 0.19]
 )
 """Thickness over chord."""
-PREBEND = -0.03 * SHARE**4
-"""Over the length."""
+PREBEND = -0.03
+"""Of the tip, over the length; it grows with the fourth power towards it."""
 LOG_EDGE = np.array(
     [0.0, -0.2, -0.42, -0.58, -0.73, -0.87, -1.07, -1.35, -1.7, -2.1, -2.6, -3.0, -3.8, -4.9]
 )
@@ -49,19 +52,22 @@ def stations(blade: Blade) -> Floats:
     """Columns of the drawing as the compiled core wants them, shape (n, 8)."""
     length = blade.length_m
     longer = length / LENGTH_M
-    scale = ROOT_NM2 * longer**STIFFNESS_GROWS
+    root_nm2 = ROOT_NM2 * longer**STIFFNESS_GROWS
+    share = np.sort([*SHARE, *TIP_SHARE])
+    chord_m = np.sort([*CHORD_M[-2:], *TIP_CHORD_M])[::-1]
+    inner = np.clip(share / 0.2, 0.0, 1.0)
+
+    def at(values: Floats) -> Floats:
+        return np.asarray(np.interp(share, SHARE, values))
+
     return np.column_stack(
         [
-            SHARE * length,
-            CHORD_M * longer**CHORD_GROWS,
-            np.radians(TWIST_DEG),
-            PREBEND * length,
-            np.where(
-                SHARE < 0.2, 0.5 + (blade.axis_fraction - 0.5) * SHARE / 0.2, blade.axis_fraction
-            ),
-            scale * 10.0**LOG_EDGE,
-            scale * 10.0**LOG_FLAP,
-            scale * 10.0**LOG_TORSION,
+            share * length,
+            np.concatenate([CHORD_M[:-2], chord_m]) * longer**CHORD_GROWS,
+            np.radians(at(TWIST_DEG)),
+            PREBEND * share**4 * length,
+            0.5 + (blade.axis_fraction - 0.5) * inner,
+            *(root_nm2 * 10.0 ** at(decades) for decades in (LOG_EDGE, LOG_FLAP, LOG_TORSION)),
         ]
     )
 
@@ -74,7 +80,7 @@ def outlines(blade: Blade) -> tuple[Floats, Floats]:
     for thickness in THICKNESS:
         round_share = np.clip((thickness - 0.4) / 0.6, 0.0, 1.0)
         half = (1.0 - round_share) * _half(x_c) + round_share * 0.5 * np.sin(turn)
-        camber = (1.0 - round_share) * 0.08 * x_c * (1.0 - x_c)
+        camber = (1.0 - round_share) * _camber(x_c)
         upper, lower = camber + thickness * half, camber - thickness * half
         points = [*zip(x_c, upper, strict=True), *zip(x_c[-2:0:-1], lower[-2:0:-1], strict=True)]
         parts.append(points)
@@ -82,8 +88,18 @@ def outlines(blade: Blade) -> tuple[Floats, Floats]:
 
 
 def _half(x_c: Floats) -> Floats:
-    """Half of the thickness distribution of the four-digit family, per unit of thickness."""
+    """Half of the thickness distribution, per unit of thickness.
+
+    Between that of the four-digit family and those of large blades, whose noses are sharper and
+    whose rears are thinner.
+    """
     series = (
         0.2969 * np.sqrt(x_c) - 0.126 * x_c - 0.3516 * x_c**2 + 0.2843 * x_c**3 - 0.1015 * x_c**4
     )
-    return np.asarray(5.0 * series)
+    nose = 1.0 - 0.1 * np.clip(1.0 - x_c / 0.3, 0.0, 1.0) ** 2
+    return np.asarray(5.0 * series * nose * (1.0 - 0.5 * x_c**3))
+
+
+def _camber(x_c: Floats) -> Floats:
+    """Camber line in chord lengths, likewise: sections of large blades carry load at the rear."""
+    return np.asarray((0.07 + 0.1 * x_c**2) * x_c * (1.0 - x_c))

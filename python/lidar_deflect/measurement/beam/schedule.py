@@ -11,10 +11,6 @@ LAST = (0.05, 0.05)
 """Gates of the last steps, in which everything may change."""
 SETTLED = 0.05
 """An unknown that moves by less than this share of its prior deviation has settled."""
-NEAR = 0.3
-"""A blade that still moves by more than this share of the next gate is not yet within it ..."""
-PATIENCE = 8
-"""... and so many steps are taken before the gate closes all the same."""
 
 
 @dataclass(frozen=True)
@@ -27,18 +23,25 @@ class Schedule:
         With what steps are taken, in this order.
     more
         How many steps may follow with the last gates until nothing moves any more.
+    near
+        A blade that still moves by more than this share of the next gate is not yet within it ...
+    patience
+        ... and so many steps are taken before the gate closes all the same.
     """
 
     first: tuple[Step, ...]
     more: int
+    near: float
+    patience: int
 
     def at(self, stage: int) -> Step:
         """Return what a step is taken with; `stage` counts from 0."""
         return self.first[stage] if stage < len(self.first) else (*LAST, "all")
 
-    def is_near(self, stage: int, moved_m: float) -> bool:
-        """Whether a blade that moved so far in a step can go on to the next stage."""
-        return moved_m < NEAR * self.at(stage + 1)[0]
+    def is_over(self, stage: int, steps: int, moved_m: float) -> bool:
+        """Whether a stage is, after so many steps the last of which moved the blade so far."""
+        is_near = moved_m < self.near * self.at(stage + 1)[0]
+        return is_near or steps >= self.patience or stage >= len(self.first)
 
 
 def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:
@@ -47,10 +50,11 @@ def _stage(name: str, *gates_m: tuple[float, float]) -> tuple[Step, ...]:
 
 _LOADS = _stage("loads", (3.0, 2.0), (2.0, 1.5), (1.5, 1.0))
 _BLADE = _stage("blade", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2))
-DRAWN = Schedule((*_LOADS, *_BLADE, *_stage("all", (0.1, 0.1), LAST)), 14)
+_ALL = _stage("all", (0.1, 0.1), LAST)
+DRAWN = Schedule((*_LOADS, *_BLADE, *_ALL), more=14, near=0.3, patience=8)
 """For a blade with a drawing."""
 
 _FAR = _stage("loads", *[(6.0, 5.0)] * 4, (4.0, 3.0))
-_NEAR = [*[(0.5, 0.5)] * 6, *[(0.3, 0.3)] * 4, *[(0.2, 0.2)] * 8, *[(0.1, 0.1)] * 8]
-UNDRAWN = Schedule((*_FAR, *_LOADS, *_stage("all", *_NEAR)), 40)
+_SURFACE = _stage("surface", (1.0, 1.0), (0.6, 0.6), (0.3, 0.4), (0.2, 0.2), (0.1, 0.1))
+UNDRAWN = Schedule((*_FAR, *_LOADS, *_SURFACE, *_ALL), more=20, near=0.05, patience=20)
 """Where no drawing tells prebend and surface: a blade alone would bend to fit the surface."""

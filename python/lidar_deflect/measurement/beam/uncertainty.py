@@ -38,6 +38,15 @@ class HoldCovariance:
         shape = (holds, sections, 4)
         return cls(values.reshape(shape), covariance.reshape(shape + shape))
 
+    def change_variance_m2(self, hold: int, along: Floats) -> float:
+        """Variance of the sum of the sections' changes since the first hold by weights (s, 3)."""
+
+        def both(one: int, other: int) -> float:
+            block = self.covariance[one, :, :3, other, :, :3]
+            return float(np.einsum("si,sitj,tj", along, block, along))
+
+        return both(hold, hold) + both(0, 0) - 2.0 * both(hold, 0)
+
 
 @dataclass(frozen=True)
 class Spreads:

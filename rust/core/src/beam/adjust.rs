@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::axis::Axis;
 use super::clocks::Clocks;
+use super::descend::Caution;
 use super::echoes::Seen;
 use super::equilibrium::Physics;
 use super::family::{self, Equilibrium, Kind, Loading, Response, Trust, Unknown};
@@ -90,6 +91,8 @@ pub enum Stage {
     Loads,
     /// The blade and where the lidars stand, not yet their ranges and the surface, or saddles would bend them.
     Blade,
+    /// Its surface as well.
+    Surface,
     /// Everything.
     All,
 }
@@ -147,6 +150,8 @@ pub struct Adjustment {
     /// The blade before the surface's unknowns; `problem.mesh` is what they make of it.
     drawn: Mesh,
     pub(super) last_step: DVector<f64>,
+    /// How far the next step is held back, see [`super::descend`].
+    pub(super) caution: Caution,
 }
 
 impl Adjustment {
@@ -184,6 +189,7 @@ impl Adjustment {
             weights,
             shared,
             own,
+            caution: Caution::new(0.0),
             linear: Vec::new(),
             drawn: problem.mesh.clone(),
             problem,
@@ -345,6 +351,11 @@ impl Adjustment {
     /// What the clock of a lidar is behind the one that all share, seconds.
     pub fn clock_s(&self, lidar: usize) -> f64 {
         self.values[self.layout.clock_at(lidar)] * self.rig.clock_s[lidar]
+    }
+
+    /// How a hold answers to its unknowns, shared ones first.
+    pub(super) fn responses(&self, hold: usize) -> &[Response] {
+        &self.linear[hold].responses
     }
 
     /// Shared and own unknowns of a hold.

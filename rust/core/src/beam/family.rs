@@ -10,9 +10,6 @@ use super::equilibrium::Physics;
 use super::mesh::Mesh;
 use super::tangent::Tangent;
 
-/// Smooth functions along the span per quantity that is known only roughly.
-pub const SPAN_MODES: usize = 5;
-
 /// What an unknown changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
@@ -68,6 +65,9 @@ pub struct Unknown {
 /// How well a drawing is known beforehand.
 #[derive(Debug, Clone, Copy)]
 pub struct Trust {
+    /// Smooth functions along the span per quantity that is known only roughly: more of them where what a lidar
+    /// sees of the outer blade tells little of the inner.
+    pub span_modes: usize,
     /// Relative standard deviation of the stiffness as a whole; its waves along the span have 0.6 of it.
     pub stiffness: f64,
     /// Relative standard deviation of the weight.
@@ -87,6 +87,7 @@ impl Default for Trust {
     /// A drawing with stiffness, as designers give it.
     fn default() -> Self {
         Self {
+            span_modes: 5,
             stiffness: 0.05,
             weight: 0.5,
             prebend: 0.05,
@@ -104,7 +105,7 @@ const COUPLING: usize = 3;
 pub fn shared_unknowns(trust: &Trust) -> Vec<Unknown> {
     let mut unknowns = Vec::new();
     let mut add = |kind, sigma| unknowns.push(Unknown { kind, sigma });
-    for mode in 0..SPAN_MODES {
+    for mode in 0..trust.span_modes {
         let wave = if mode == 0 { 1.0 } else { 0.6 };
         add(Kind::Weight(mode), trust.weight * wave);
         for which in 0..3 {
@@ -160,7 +161,7 @@ pub fn hold_unknowns(loading: &Loading, trust: &Trust) -> Vec<Unknown> {
     for axis in 0..3 {
         add(Kind::Root { axis }, trust.root_rad);
     }
-    for mode in 0..SPAN_MODES {
+    for mode in 0..trust.span_modes {
         for which in 0..3 {
             add(Kind::Soft { which, mode }, 0.1 * trust.stiffness);
         }

@@ -8,16 +8,19 @@
 
 pub mod adjust;
 pub mod axis;
+mod bill;
 pub mod budget;
 pub mod carry;
 pub mod clocks;
 pub mod common;
+mod descend;
 pub mod design;
 pub mod echoes;
 pub mod equilibrium;
 pub mod factor;
 pub mod family;
 pub mod gather;
+mod keep;
 pub mod layout;
 pub mod mesh;
 pub mod near;

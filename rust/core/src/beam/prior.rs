@@ -27,6 +27,10 @@ impl Adjustment {
 
     /// The first stage at which an unknown may change.
     fn needs(&self, unknown: usize) -> Stage {
+        let surface = self.layout.shape_at();
+        if (surface..surface + self.problem.shape.waves_from()).contains(&unknown) {
+            return Stage::Surface;
+        }
         if unknown >= self.layout.lidar_at(0) {
             return Stage::All;
         }
@@ -126,7 +130,7 @@ impl Adjustment {
         let mut information = self.rig.information.clone();
         match stage {
             Stage::Loads => information *= HELD,
-            Stage::Blade => {
+            Stage::Blade | Stage::Surface => {
                 for lidar in 0..self.layout.channels.len() {
                     let first = self.layout.lidar_at(lidar) - self.layout.lidar_at(0);
                     for k in first + POSE..first + RIG + self.layout.channels[lidar] {

@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M};
+use super::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, RANGE_M, Stage};
+use super::bill::Bill;
 use super::common;
 use super::echoes::{Echo, Edge};
 use super::layout::{Layout, RANGES, RIG};
@@ -11,7 +12,7 @@ use super::rig::Lidar;
 use super::sight::{Contact, Hit};
 use super::silhouette::{ScanPlane, Silhouette};
 use super::sums::{BOTH, Part, Row, Sums};
-use super::weights::{EdgeMet, Tally, Used, cost, faded, robust};
+use super::weights::{EdgeMet, Tally, Used, faded, robust};
 
 /// Echoes nearer to the end of their run than this are mixed with what lies behind.
 pub(super) const MIXED_ECHOES: u32 = 2;
@@ -64,6 +65,8 @@ pub struct Rows<'a> {
     noise_m: Vec<f64>,
     /// Whether single echoes are wanted; nobody asks a stretch before its last step.
     keeps: bool,
+    pub(super) echo_bill: Bill,
+    edge_bill: Bill,
     pub(super) tally: Tally,
 }
 
@@ -75,6 +78,7 @@ impl<'a> Rows<'a> {
         lidars: &'a [Lidar],
         gates: &'a Gates,
     ) -> Self {
+        let is_judged = adjustment.judges(gates);
         Self {
             lidars,
             gates,
@@ -96,6 +100,8 @@ impl<'a> Rows<'a> {
                 .iter()
                 .map(|noise_m| noise_m.hypot(gates.coarse_m()[0]))
                 .collect(),
+            echo_bill: Bill::new(is_judged),
+            edge_bill: Bill::new(is_judged),
             keeps: gates.is_fine() || !adjustment.follows_load,
             tally: Tally::default(),
             adjustment,
@@ -131,7 +137,9 @@ impl<'a> Rows<'a> {
         self.finish().0
     }
 
-    pub(super) fn finish(self) -> (Part, Tally) {
+    pub(super) fn finish(mut self) -> (Part, Tally) {
+        self.tally.cost += self.echo_bill.total(self.tally.missed);
+        self.tally.cost += self.edge_bill.total(self.tally.edges_left_out[1]);
         let free = &self.adjustment.free;
         let state = self.adjustment.state_at(self.hold).into_iter().enumerate();
         let (places, unknowns): (Vec<_>, Vec<_>) = state.filter(|(_, i)| free.contains(i)).unzip();
@@ -153,6 +161,9 @@ impl<'a> Rows<'a> {
         let s_m = self.arc_m(&hit.contact);
         let upright = faded(hit.cosine, FLAT_COSINE);
         if echo.from_end < MIXED_ECHOES || upright == 0.0 {
+            if upright == 0.0 {
+                self.echo_bill.add_faded();
+            }
             self.tally.unfit += 1;
             return Some(s_m);
         }
@@ -164,7 +175,11 @@ impl<'a> Rows<'a> {
         let sigma = (noise_m * noise_m + own_m * own_m).sqrt();
         let point = lidar.origin + direction * (hit.range_m + residual);
         let met = self.met(echo, &hit.contact, residual, point, hit.cosine);
-        if residual.abs() > self.gates.echo_m.max(4.0 * sigma) {
+        let variance = self.variance_m2(&met, noise_m);
+        let gate_m = self.gates.echo_m.max(4.0 * sigma);
+        self.echo_bill
+            .add(residual, sigma, gate_m, variance, upright);
+        if residual.abs() > gate_m {
             if self.keeps {
                 self.tally.rejected.push(met);
             }
@@ -173,14 +188,20 @@ impl<'a> Rows<'a> {
         if self.keeps {
             self.tally.used.push(met);
         }
-        let alone = (hit.cosine / noise_m).powi(2);
+        let weight = robust(residual, sigma, self.gates.echo_m) / variance;
+        self.add_hit(echo, &hit, time_ns, residual, upright * weight);
+        Some(s_m)
+    }
+
+    /// Variance of an echo among those of its patch, by the noise of its range.
+    fn variance_m2(&self, met: &Used, noise_m: f64) -> f64 {
+        let weights = &self.adjustment.weights;
+        let alone = (met.cosine / noise_m).powi(2);
         let factor = match weights.common.get(self.hold) {
             Some(common) => common.echo_factor(met.patch, weights.surface_m, alone),
             None => 1.0 + weights.surface_m * weights.surface_m * alone,
         };
-        let weight = robust(residual, sigma, self.gates.echo_m) / (noise_m * noise_m * factor);
-        self.add_hit(echo, &hit, time_ns, residual, upright * weight);
-        Some(s_m)
+        noise_m * noise_m * factor
     }
 
     /// An echo as it met the model at a contact.
@@ -362,6 +383,7 @@ impl<'a> Rows<'a> {
     ) {
         let firm = firmness(silhouette, self.gates);
         if firm == 0.0 {
+            self.edge_bill.add_faded();
             self.tally.edges_left_out[0] += 1;
             return;
         }
@@ -386,7 +408,8 @@ impl<'a> Rows<'a> {
         let gate_rad = (self.gates.edge_m / silhouette.range_m).max(4.0 * sigma);
         let depth_m = (edge.range_m - silhouette.range_m).abs();
         let variance = sigma_rad * sigma_rad + grid;
-        self.tally.cost += cost(residual, sigma, gate_rad, variance);
+        self.edge_bill
+            .add(residual, sigma, gate_rad, variance, firm);
         if residual.abs() > gate_rad || depth_m > self.gates.echo_m.max(0.5) {
             self.tally.edges_left_out[2] += 1;
             return;
@@ -424,7 +447,7 @@ fn range_slopes_m(cosine: f64) -> [f64; 2] {
 
 /// Share of its weight that an edge keeps: less where the surface turns away slowly or is seen edge-on.
 fn firmness(silhouette: &Silhouette, gates: &Gates) -> f64 {
-    if !gates.is_search() {
+    if gates.stage >= Stage::Surface {
         return faded(silhouette.soft_m, SOFT_M) * faded(silhouette.cosine, FLAT_COSINE);
     }
     let coarse_m = gates.coarse_m()[1];
@@ -451,8 +474,21 @@ mod tests {
     #[test]
     fn slopes_of_all_unknowns_are_those_of_the_residuals() {
         let adjustment = sample::adjustment(0.02);
+        let unknowns = (0..adjustment.layout.len()).step_by(7);
+        expect_slopes(&adjustment, unknowns, 0.02);
+    }
+
+    #[test]
+    fn so_are_those_of_a_surface_without_a_drawing() {
+        let mut adjustment = sample::undrawn();
+        let surface = adjustment.layout.shape_at();
+        adjustment.shift(surface, 0.05);
+        let unknowns = surface..surface + adjustment.problem.shape.waves_from();
+        expect_slopes(&adjustment, unknowns, 0.002);
+    }
+
+    fn expect_slopes(adjustment: &Adjustment, unknowns: impl Iterator<Item = usize>, step: f64) {
         let ((normal, _), prior) = (adjustment.normal(&WIDE), adjustment.prior(WIDE.stage));
-        let step = 0.02;
         let cost = |unknown: usize, change: f64| {
             let mut moved = adjustment.clone();
             moved.shift(unknown, change);
@@ -460,7 +496,7 @@ mod tests {
         };
         let rig = adjustment.layout.lidar_at(0)..adjustment.layout.shape_at();
         let scale = normal.right.amax();
-        for unknown in (0..adjustment.layout.len()).step_by(7) {
+        for unknown in unknowns {
             // Unknowns of the lidars have units of their own.
             let step = if rig.contains(&unknown) { 1e-5 } else { step };
             let slope = (cost(unknown, step) - cost(unknown, -step)) / (2.0 * step);

@@ -56,6 +56,32 @@ fn noise(place: usize) -> f64 {
 
 /// An adjustment at its start whose echoes come from that very state, `shift_m` too far away.
 pub fn adjustment(shift_m: f64) -> Adjustment {
+    trusted(shift_m, Trust::default(), ShapeTrust::default())
+}
+
+/// The same where no drawing tells stiffness, prebend and surface.
+pub fn undrawn() -> Adjustment {
+    let trust = Trust {
+        span_modes: 8,
+        stiffness: 0.3,
+        prebend: 0.8,
+        free_rad_m: 3e-4,
+        ..Trust::default()
+    };
+    let shape = ShapeTrust {
+        chord: 0.2,
+        chord_waves: 0.2,
+        tip: 2.0,
+        form: 0.7,
+        waves_m: 0.006,
+        slow_knot_m: 2.0,
+        wave_knot_m: 2.0,
+        ..ShapeTrust::default()
+    };
+    trusted(0.0, trust, shape)
+}
+
+fn trusted(shift_m: f64, trust: Trust, shape: ShapeTrust) -> Adjustment {
     let mesh = Mesh::new(&design(), &[20.0, 40.0]);
     let saddles = vec![mesh.node_at(20.0), mesh.node_at(40.0)];
     let force_n = vec![Vector3::x() * 3e4; 2];
@@ -68,8 +94,8 @@ pub fn adjustment(shift_m: f64) -> Adjustment {
         },
     };
     let problem = Problem {
-        shape: Shape::new(&mesh, ShapeTrust::default(), 35.0),
-        trust: Trust::default(),
+        shape: Shape::new(&mesh, shape, 35.0),
+        trust,
         full_n: force_n,
         holds: vec![hold],
         saddles,

@@ -2,17 +2,19 @@
 
 use nalgebra::DVector;
 
-use super::adjust::{Adjustment, Gates};
+use super::adjust::{Adjustment, Gates, Stage};
 use super::echoes::Echo;
 use super::near::Near;
 use super::rows::{MIXED_ECHOES, Rows};
 use super::step::Step;
 use super::sums::Part;
-use super::weights::{Tally, cost, robust};
+use super::weights::{Tally, robust};
 use crate::error::BeamError;
 
-/// So many echoes of a hold suffice, and so many edges.
-const ENOUGH: usize = 2000;
+/// So many echoes of a hold suffice, and so many edges; so many echoes tell as much as one.
+const OF_BLADE: (usize, f64) = (2000, 1.0);
+/// The same where the surface is learned: neighbours are off alike while it is not known.
+const OF_SURFACE: (usize, f64) = (8000, 3.0);
 /// A step that does no good is shortened to this share, at most so often.
 const SHORTENED: (f64, usize) = (0.4, 6);
 
@@ -36,11 +38,15 @@ impl Adjustment {
     }
 
     /// Goes a step, and comes back where the data do not cost less there.
-    fn is_better(&mut self, step: &DVector<f64>, gates: &Gates, before: f64) -> bool {
+    pub(super) fn is_better(&mut self, step: &DVector<f64>, gates: &Gates, before: f64) -> bool {
         let spot = self.spot();
         self.values += step;
         self.settle_in(step);
-        let is_better = self.linearise().is_ok() && {
+        let solved = match self.is_learned(gates) {
+            true => self.linearise_kept(),
+            false => self.linearise(),
+        };
+        let is_better = solved.is_ok() && {
             let (_, tallies) = self.normal(gates);
             self.cost(gates, &tallies) < before
         };
@@ -51,7 +57,7 @@ impl Adjustment {
     }
 
     /// What the unknowns cost, by what became of the data and by what was known before.
-    fn cost(&self, gates: &Gates, tallies: &[Tally]) -> f64 {
+    pub(super) fn cost(&self, gates: &Gates, tallies: &[Tally]) -> f64 {
         self.surprise(gates.stage) + tallies.iter().map(|tally| tally.cost).sum::<f64>()
     }
 }
@@ -60,16 +66,20 @@ impl Rows<'_> {
     /// Rows by distances of points, and what became of the data.
     pub(super) fn collect_near(mut self) -> (Part, Tally) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        for echo in some(&seen.echoes) {
-            self.add_point(echo);
+        let (enough, alike) = match self.gates.stage {
+            Stage::Surface => OF_SURFACE,
+            _ => OF_BLADE,
+        };
+        for echo in some(&seen.echoes, enough) {
+            self.add_point(echo, alike);
         }
-        for edge in some(&seen.edges) {
+        for edge in some(&seen.edges, enough) {
             self.add_edge(edge);
         }
         self.finish()
     }
 
-    fn add_point(&mut self, echo: &Echo) {
+    fn add_point(&mut self, echo: &Echo, alike: f64) {
         if echo.from_end < MIXED_ECHOES {
             self.tally.unfit += 1;
             return;
@@ -86,17 +96,19 @@ impl Rows<'_> {
         let cosine = -near.contact.normal.dot(&direction);
         let met = self.met(echo, &near.contact, near.off_m, point, cosine);
         let (gate_m, sigma_m) = (self.gates.echo_m, self.gates.coarse_m()[0]);
-        self.tally.cost += cost(near.off_m, sigma_m, gate_m, sigma_m * sigma_m);
+        let variance = sigma_m * sigma_m * alike;
+        self.echo_bill
+            .add(near.off_m, sigma_m, gate_m, variance, 1.0);
         if near.off_m.abs() > gate_m {
             self.tally.rejected.push(met);
         } else {
             self.tally.used.push(met);
-            self.add_near(echo, &near, sigma_m);
+            self.add_near(echo, &near, sigma_m, variance);
         }
     }
 
-    fn add_near(&mut self, echo: &Echo, near: &Near, sigma_m: f64) {
-        let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / (sigma_m * sigma_m);
+    fn add_near(&mut self, echo: &Echo, near: &Near, sigma_m: f64, variance: f64) {
+        let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / variance;
         let time_ns = self.time_ns(echo.lidar, echo.time_ns);
         let moves = self.fill_row(&near.contact, &near.towards, echo.lidar, time_ns);
         self.add_row(&near.contact, moves, near.off_m, weight);
@@ -104,13 +116,12 @@ impl Rows<'_> {
 }
 
 /// Enough of them; an odd stride, for ends of scan lines come by twos.
-fn some<T>(all: &[T]) -> impl Iterator<Item = &T> {
-    all.iter().step_by((all.len() / ENOUGH) | 1)
+fn some<T>(all: &[T], enough: usize) -> impl Iterator<Item = &T> {
+    all.iter().step_by((all.len() / enough) | 1)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::adjust::Stage;
     use super::super::sample;
     use super::*;
 

@@ -1,9 +1,11 @@
 //! The surface as built: chord, setting angle and waves against the drawing.
 
 mod built;
+mod forms;
 
 use std::f64::consts::PI;
 
+use self::forms::{FORMS, forms};
 use super::mesh::Mesh;
 use super::sight::Contact;
 use super::table;
@@ -16,12 +18,17 @@ pub struct ShapeTrust {
     pub chord: f64,
     /// Of the chord as it varies along the span, relative.
     pub chord_waves: f64,
+    /// The same at the tip, where blades differ most, over that.
+    pub tip: f64,
     /// Of the setting angle, rad.
     pub setting_rad: f64,
     /// Of the twist as it varies along the span, rad.
     pub twist_waves_rad: f64,
     /// Of the axis within the chord, chord lengths.
     pub axis_fraction: f64,
+    /// Of each way in which contours of blades differ (see [`forms`]), as a share of what is usual; none
+    /// where a drawing tells the contour.
+    pub form: f64,
     /// Of each wave of the surface, metres.
     pub waves_m: f64,
     /// Distance between the knots of chord and twist, metres.
@@ -37,9 +44,11 @@ impl Default for ShapeTrust {
         Self {
             chord: 0.004,
             chord_waves: 0.001,
+            tip: 1.0,
             setting_rad: 0.3f64.to_radians(),
             twist_waves_rad: 0.0005,
             axis_fraction: 0.002,
+            form: 0.0,
             waves_m: 0.002,
             slow_knot_m: 9.0,
             wave_knot_m: 1.0,
@@ -60,24 +69,70 @@ pub struct Shape {
     trust: ShapeTrust,
     from_m: f64,
     slow: usize,
-    knots: usize,
+    forms: Knots,
+    waves: Knots,
+}
+
+/// Unknowns by knots along the span, so many in each.
+#[derive(Debug, Clone)]
+struct Knots {
+    first: usize,
+    count: usize,
+    apart_m: f64,
+    each: usize,
+}
+
+impl Knots {
+    /// As many as a length needs, from an unknown on.
+    fn over(length_m: f64, apart_m: f64, each: usize, first: usize) -> Self {
+        Self {
+            first,
+            count: (length_m / apart_m).ceil() as usize + 1,
+            apart_m,
+            each,
+        }
+    }
+
+    fn end(&self) -> usize {
+        self.first + self.count * self.each
+    }
+
+    /// First unknown and share of both knots beside a place outboard of the first.
+    fn beside(&self, x_m: f64) -> impl Iterator<Item = (usize, f64)> {
+        let (first, each) = (self.first, self.each);
+        let two = hats(x_m, self.apart_m, self.count);
+        two.into_iter()
+            .filter(|_| self.count > 0)
+            .map(move |(knot, share)| (first + knot * each, share))
+    }
 }
 
 impl Shape {
     /// Of the blade outboard of `from_m`; inboard of it nothing is seen.
     pub fn new(mesh: &Mesh, trust: ShapeTrust, from_m: f64) -> Self {
         let length = (mesh.length_m() - from_m).max(trust.wave_knot_m);
+        let slow = (length / trust.slow_knot_m).ceil() as usize + 1;
+        let mut forms = Knots::over(length, forms::KNOT_M, FORMS, 3 + 2 * slow);
+        if trust.form == 0.0 {
+            forms.count = 0;
+        }
         Self {
             trust,
             from_m,
-            slow: (length / trust.slow_knot_m).ceil() as usize + 1,
-            knots: (length / trust.wave_knot_m).ceil() as usize + 1,
+            slow,
+            waves: Knots::over(length, trust.wave_knot_m, 2 * CHORD_WAVES, forms.end()),
+            forms,
         }
     }
 
-    /// Number of unknowns: chord, setting, axis, chord and twist by slow knots, waves.
+    /// Number of unknowns: chord, setting, axis, chord and twist by slow knots, contour, waves.
     pub fn len(&self) -> usize {
-        3 + 2 * self.slow + 2 * CHORD_WAVES * self.knots
+        self.waves.end()
+    }
+
+    /// Number of the first wave.
+    pub fn waves_from(&self) -> usize {
+        self.waves.first
     }
 
     /// Whether there is none: never.
@@ -104,7 +159,7 @@ impl Shape {
         out.push((first + 2, -self.trust.axis_fraction * local.dot(&chord)));
         let s_m = self.arc_m(mesh, contact);
         for (knot, weight) in hats(s_m - self.from_m, self.trust.slow_knot_m, self.slow) {
-            out.push((first + 3 + knot, self.trust.chord_waves * weight * swell));
+            out.push((first + 3 + knot, self.chord_wave(knot) * weight * swell));
             out.push((
                 first + 3 + self.slow + knot,
                 self.trust.twist_waves_rad * weight * twist,
@@ -121,16 +176,32 @@ impl Shape {
         first: usize,
         out: &mut Vec<(usize, f64)>,
     ) {
-        let outward = self.waves_m(mesh, contact.section.node) * along.dot(&contact.normal);
-        let side = usize::from(mesh.is_second_side(contact.vertex));
-        let first = first + 3 + 2 * self.slow + side * CHORD_WAVES * self.knots;
-        let heights = heights(contact.x_c);
+        let outward = along.dot(&contact.normal);
         let x_m = self.arc_m(mesh, contact) - self.from_m;
-        for (knot, weight) in hats(x_m, self.trust.wave_knot_m, self.knots) {
-            let place = first + knot * CHORD_WAVES;
-            let waves = heights.iter().enumerate();
-            out.extend(waves.map(|(wave, height)| (place + wave, outward * weight * height)));
-        }
+        let node = contact.section.node;
+        let is_second = mesh.is_second_side(contact.vertex);
+        let mut add = |knots: &Knots, offset: usize, size_m: f64, heights: &[f64]| {
+            for (place, share) in knots.beside(x_m) {
+                let slope = outward * size_m * share;
+                let each = heights.iter().enumerate();
+                out.extend(each.map(|(k, height)| (first + place + offset + k, slope * height)));
+            }
+        };
+        let (form_m, wave_m) = (self.form_m(mesh, node), self.waves_m(mesh, node));
+        add(&self.forms, 0, form_m, &forms(contact.x_c, is_second));
+        let side = usize::from(is_second) * CHORD_WAVES;
+        add(&self.waves, side, wave_m, &heights(contact.x_c));
+    }
+
+    /// Relative standard deviation of the chord at a knot.
+    fn chord_wave(&self, knot: usize) -> f64 {
+        let is_tip = knot + 2 >= self.slow;
+        self.trust.chord_waves * if is_tip { self.trust.tip } else { 1.0 }
+    }
+
+    /// Size of the forms at a node, metres.
+    fn form_m(&self, mesh: &Mesh, node: usize) -> f64 {
+        self.trust.form * mesh.chord_m[node]
     }
 
     /// Standard deviation of a wave at a node: a chord of centimetres has none of millimetres.

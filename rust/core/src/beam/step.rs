@@ -11,12 +11,8 @@ use crate::error::BeamError;
 
 /// Largest step of an unknown, standard deviations: farther away the neighbours are not linear.
 const LARGEST_STEP: f64 = 3.0;
-/// The same where deviations are those of blades in general.
-const LARGEST_VAGUE_STEP: f64 = 0.3;
 /// The same of the surface, whose unknowns are many and each of little effect.
 const LARGEST_WAVE: f64 = 6.0;
-/// Gate at which steps are held back as a prior would, metres.
-const FREE_GATE_M: f64 = 0.025;
 /// A step that takes back so much of the last one is halved: the truth lies between both.
 const TURNED_BACK: f64 = 0.5;
 /// A step may lead so far from where the slopes say it leads, as a share of the gate: loads and stiffness
@@ -43,6 +39,9 @@ impl Adjustment {
     /// # Errors
     /// [`BeamError::Singular`].
     pub fn step(&mut self, gates: &Gates) -> Result<Step, BeamError> {
+        if self.is_learned(gates) {
+            return self.descend(gates);
+        }
         if gates.is_search() {
             return self.seek(gates);
         }
@@ -50,6 +49,16 @@ impl Adjustment {
         // Without equilibria the slopes stay, and the next step comes back.
         let _ = self.linearise();
         Ok(step)
+    }
+
+    /// Whether the surface is learned with the blade.
+    pub(super) fn is_learned(&self, gates: &Gates) -> bool {
+        self.is_vague() && gates.stage >= Stage::Surface
+    }
+
+    /// Whether steps are judged by what data cost.
+    pub(super) fn judges(&self, gates: &Gates) -> bool {
+        !self.follows_load && (gates.is_search() || self.is_learned(gates))
     }
 
     /// The same where the slopes are the model: a stretch never solves its equilibrium anew.
@@ -80,22 +89,28 @@ impl Adjustment {
         &mut self,
         gates: &Gates,
     ) -> Result<(DVector<f64>, f64, Vec<Tally>), BeamError> {
-        let (mut normal, tallies) = self.normal(gates);
-        self.damp(&mut normal, gates);
+        let (normal, tallies) = self.normal(gates);
+        let (mut step, largest) = self.solved(normal)?;
+        if gates.is_fine() {
+            self.settle(&mut step);
+        }
+        Ok((step, largest, tallies))
+    }
+
+    /// The step that normal equations ask for, cut to where slopes are good for, and its largest change of an
+    /// unknown of the blade before it was cut.
+    pub(super) fn solved(&self, normal: Normal) -> Result<(DVector<f64>, f64), BeamError> {
         let (part, _) = normal.solve().ok_or(BeamError::Singular)?;
         let mut step = DVector::zeros(self.layout.len());
         step.rows_mut(self.free.start, self.free.len())
             .copy_from(&part);
         let largest = step.rows(0, self.layout.sway_at(0)).amax();
         let swollen = step.rows(self.layout.shape_at(), self.layout.shape).amax();
-        let excess = (largest / self.largest_step(gates.stage)).max(swollen / LARGEST_WAVE);
+        let excess = (largest / LARGEST_STEP).max(swollen / LARGEST_WAVE);
         if excess > 1.0 {
             step /= excess;
         }
-        if self.is_vague() || gates.is_fine() {
-            self.settle(&mut step);
-        }
-        Ok((step, largest, tallies))
+        Ok((step, largest))
     }
 
     /// Gives the lidars their part of a step that was gone, and the surface its shape.
@@ -157,28 +172,5 @@ impl Adjustment {
             *step *= 0.5;
         }
         self.last_step.copy_from(step);
-    }
-
-    /// Holds back, while gates are wide, what a blade without a drawing could do far from where it is.
-    fn damp(&self, normal: &mut Normal, gates: &Gates) {
-        if !self.is_vague() || gates.stage != Stage::All {
-            return;
-        }
-        let rig = self.layout.lidar_at(0)..self.layout.shape_at();
-        let damping = (gates.echo_m / FREE_GATE_M).powi(2);
-        for (place, unknown) in self.free.clone().enumerate() {
-            if !rig.contains(&unknown) {
-                normal.matrix[(place, place)] += damping;
-            }
-        }
-    }
-
-    /// How far an unknown of the blade may go in one step, standard deviations.
-    fn largest_step(&self, stage: Stage) -> f64 {
-        if self.is_vague() && stage == Stage::All {
-            LARGEST_VAGUE_STEP
-        } else {
-            LARGEST_STEP
-        }
     }
 }

@@ -31,7 +31,7 @@ pub struct Weights {
 /// What became of the data of a hold.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
-    /// What all of them cost, those beyond the gate as much as those at it; while the blade is being found.
+    /// What all of them cost, see [`super::bill`].
     pub cost: f64,
     /// Echoes that counted.
     pub used: Vec<Used>,

@@ -73,8 +73,8 @@ impl BeamAdjustment {
         rig_prior: PyReadonlyArray1<'_, f64>,
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
-        trust: [f64; 6],
-        shape_trust: [f64; 8],
+        trust: [f64; 7],
+        shape_trust: [f64; 10],
         noise_m: f64,
         surface_m: f64,
         edge_rad: f64,
@@ -100,13 +100,23 @@ impl BeamAdjustment {
                     .sum(),
             },
         };
-        let [stiffness, weight, prebend, free_rad_m, root_rad, coupling] = trust;
+        let [
+            span_modes,
+            stiffness,
+            weight,
+            prebend,
+            free_rad_m,
+            root_rad,
+            coupling,
+        ] = trust;
         let [
             chord,
             chord_waves,
+            tip,
             setting_rad,
             twist_waves_rad,
             axis_fraction,
+            form,
             waves_m,
             slow_knot_m,
             wave_knot_m,
@@ -114,9 +124,11 @@ impl BeamAdjustment {
         let shape = ShapeTrust {
             chord,
             chord_waves,
+            tip,
             setting_rad,
             twist_waves_rad,
             axis_fraction,
+            form,
             waves_m,
             slow_knot_m,
             wave_knot_m,
@@ -125,6 +137,7 @@ impl BeamAdjustment {
             mesh: blade.mesh.clone(),
             saddles: blade.saddles.clone(),
             trust: Trust {
+                span_modes: span_modes as usize,
                 stiffness,
                 weight,
                 prebend,
@@ -520,6 +533,7 @@ fn stage_named(name: &str) -> Result<Stage, InvalidValue> {
     match name {
         "loads" => Ok(Stage::Loads),
         "blade" => Ok(Stage::Blade),
+        "surface" => Ok(Stage::Surface),
         "all" => Ok(Stage::All),
         _ => Err(InvalidValue {
             name: "stage",

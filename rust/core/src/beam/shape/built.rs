@@ -5,7 +5,8 @@
 
 use nalgebra::{Rotation2, Vector2, Vector3};
 
-use super::{CHORD_WAVES, Shape, hats};
+use super::forms::forms;
+use super::{CHORD_WAVES, Knots, Shape, hats, heights};
 use crate::beam::mesh::Mesh;
 
 /// What the unknowns add at one arc length.
@@ -13,8 +14,9 @@ struct Change<'a> {
     scale: f64,
     turn: Rotation2<f64>,
     shift_m: Vector2<f64>,
-    waves: [(&'a [f64], f64); 4],
-    waves_m: f64,
+    /// Values of forms and waves at the knots beside the node, and their size, metres.
+    forms: Vec<(&'a [f64], f64)>,
+    waves: Vec<(&'a [f64], f64)>,
 }
 
 impl Shape {
@@ -35,22 +37,28 @@ impl Shape {
     fn change<'a>(&self, drawn: &Mesh, values: &'a [f64], node: usize) -> Change<'a> {
         let (trust, x) = (&self.trust, drawn.s_m[node] - self.from_m);
         let slow = hats(x, self.trust.slow_knot_m, self.slow);
-        let sum = |first: usize| -> f64 { slow.map(|(k, w)| w * values[first + k]).iter().sum() };
-        let twist = trust.setting_rad * values[1] + trust.twist_waves_rad * sum(3 + self.slow);
+        let twist: f64 = slow
+            .map(|(k, w)| w * values[3 + self.slow + k])
+            .iter()
+            .sum();
+        let twist = trust.setting_rad * values[1] + trust.twist_waves_rad * twist;
+        let swell: f64 = slow
+            .map(|(k, w)| w * self.chord_wave(k) * values[3 + k])
+            .iter()
+            .sum();
         let chord = drawn.chord[node].xy() * drawn.chord_m[node];
-        let waves = &values[3 + 2 * self.slow..];
-        let side = CHORD_WAVES * self.knots;
-        let [one, two] = hats(x, trust.wave_knot_m, self.knots);
-        let at = |side_of: usize, (knot, weight): (usize, f64)| {
-            let first = side_of * side + knot * CHORD_WAVES;
-            (&waves[first..][..CHORD_WAVES], weight)
+        let at = |knots: &Knots, size_m: f64| {
+            let beside = knots.beside(x);
+            beside
+                .map(|(place, share)| (&values[place..][..knots.each], share * size_m))
+                .collect()
         };
         Change {
-            scale: (trust.chord * values[0] + trust.chord_waves * sum(3)).exp(),
+            scale: (trust.chord * values[0] + swell).exp(),
             turn: Rotation2::new(drawn.hand * twist),
             shift_m: chord * (-trust.axis_fraction * values[2]),
-            waves: [at(0, one), at(0, two), at(1, one), at(1, two)],
-            waves_m: self.waves_m(drawn, node),
+            forms: at(&self.forms, self.form_m(drawn, node)),
+            waves: at(&self.waves, self.waves_m(drawn, node)),
         }
     }
 }
@@ -61,14 +69,19 @@ impl Change<'_> {
     }
 
     /// How far a side stands out at a place along the chord, metres.
-    fn height_m(&self, side: usize, x_c: f64) -> f64 {
-        let heights = super::heights(x_c);
-        let of = |(values, weight): &(&[f64], f64)| -> f64 {
-            let waves = values.iter().zip(&heights);
-            weight * waves.map(|(value, height)| value * height).sum::<f64>()
-        };
-        self.waves_m * self.waves[2 * side..][..2].iter().map(of).sum::<f64>()
+    fn height_m(&self, is_second: bool, x_c: f64) -> f64 {
+        let side = usize::from(is_second) * CHORD_WAVES;
+        sum(&self.forms, 0, &forms(x_c, is_second)) + sum(&self.waves, side, &heights(x_c))
     }
+}
+
+/// Heights times their values, from an offset in each knot.
+fn sum(knots: &[(&[f64], f64)], offset: usize, heights: &[f64]) -> f64 {
+    let of = |(values, size_m): &(&[f64], f64)| -> f64 {
+        let pairs = values[offset..].iter().zip(heights);
+        size_m * pairs.map(|(value, height)| value * height).sum::<f64>()
+    };
+    knots.iter().map(of).sum()
 }
 
 /// Outline of a node with its waves: each point follows the two facets that meet in it.
@@ -79,8 +92,7 @@ fn raised(drawn: &Mesh, node: usize, change: &Change) -> Vec<Vector2<f64>> {
     let lift = |facet: usize, at: usize| {
         let along = point(facet + 1) - point(facet);
         let outward = Vector2::new(-along.y, along.x) * drawn.hand;
-        let side = usize::from(drawn.is_second_side(facet));
-        let height_m = change.height_m(side, x_c[at]);
+        let height_m = change.height_m(drawn.is_second_side(facet), x_c[at]);
         outward.try_normalize(1e-12).unwrap_or_default() * height_m
     };
     (0..count)
