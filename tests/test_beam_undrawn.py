@@ -1,6 +1,5 @@
 """How far is the beam method from the truth where no drawing of the blade is given (simulated)?"""
 
-
 import numpy as np
 import pytest
 
