@@ -1,6 +1,6 @@
 //! A simulated edgewise test with four VLP-16, in memory: what the benches of whole methods measure.
 
-use lidar_deflect_core::capture::{DatagramBatch, DatagramReader, PcapWriter};
+use lidar_deflect_core::capture::{DatagramReader, PcapWriter};
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport};
 use lidar_deflect_core::synthetic::blade::{BuildErrors, Orientation};
@@ -125,33 +125,12 @@ pub fn capture(mut simulation: Simulation) -> (Vec<u8>, Vec<WorldFromSensor>) {
     (writer.into_inner(), poses)
 }
 
-/// Bytes of a batch.
-const BATCH_BYTES: usize = 1 << 19;
-
-/// Hands a capture over in batches; the next one is read beside.
-pub fn by_batches(bytes: &[u8], mut take: impl FnMut(&DatagramBatch) + Send) {
-    let mut reader = DatagramReader::new(bytes).unwrap();
-    let (mut batch, mut ahead) = (DatagramBatch::default(), DatagramBatch::default());
-    loop {
-        let fill = || {
-            ahead.clear();
-            while ahead.bytes() < BATCH_BYTES
-                && let Some(datagram) = reader.next().unwrap()
-            {
-                ahead.push(&datagram);
-            }
-        };
-        rayon::join(fill, || take(&batch));
-        std::mem::swap(&mut batch, &mut ahead);
-        if batch.is_empty() {
-            return;
-        }
-    }
-}
-
 /// Who sends what in a capture.
 pub fn scan(bytes: &[u8]) -> ScanReport {
+    let mut reader = DatagramReader::new(bytes).unwrap();
     let mut scan = Scan::new(ScanOptions::default());
-    by_batches(bytes, |batch| scan.push_batch(batch));
+    while let Some(datagram) = reader.next().unwrap() {
+        scan.push(&datagram);
+    }
     scan.finish()
 }

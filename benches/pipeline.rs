@@ -4,6 +4,7 @@
 //! test: 1000 elements a second are real time.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use lidar_deflect_core::capture::{DatagramBatch, DatagramReader};
 use lidar_deflect_core::cluster::line::LineParams;
 use lidar_deflect_core::cluster::radius::{Intervals, RadiusModel};
 use lidar_deflect_core::fit::arc::SpanAxis;
@@ -15,7 +16,7 @@ use lidar_deflect_core::paper::passthrough::PassThrough;
 use lidar_deflect_core::paper::reader::{FramePlan, FrameReader};
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::{Plane, TipLimits};
-use lidar_deflect_core::stream::ScanReport;
+use lidar_deflect_core::stream::{Reading, ScanReport};
 use lidar_deflect_core::time::Timestamp;
 use nalgebra::Vector3;
 use std::hint::black_box;
@@ -23,9 +24,33 @@ use std::hint::black_box;
 #[path = "edgewise.rs"]
 mod edgewise;
 
-use edgewise::{START, by_batches, capture, scan};
+use edgewise::{START, capture, scan};
 
 const PERIOD_NS: i64 = 100_000_000;
+
+/// Bytes of a batch.
+const BATCH_BYTES: usize = 1 << 19;
+
+/// Hands a capture over in batches; the next one is read beside.
+fn by_batches(bytes: &[u8], mut take: impl FnMut(&DatagramBatch) + Send) {
+    let mut reader = DatagramReader::new(bytes).unwrap();
+    let (mut batch, mut ahead) = (DatagramBatch::default(), DatagramBatch::default());
+    loop {
+        let fill = || {
+            ahead.clear();
+            while ahead.bytes() < BATCH_BYTES
+                && let Some(datagram) = reader.next().unwrap()
+            {
+                ahead.push(&datagram);
+            }
+        };
+        rayon::join(fill, || take(&batch));
+        std::mem::swap(&mut batch, &mut ahead);
+        if batch.is_empty() {
+            return;
+        }
+    }
+}
 
 fn frames(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<Frame> {
     let plan = FramePlan {

@@ -7,7 +7,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from lidar_deflect import clocks
+from lidar_deflect import clock_screen, clocks
 from lidar_deflect.channels import Channel
 from lidar_deflect.pipeline import Test
 from scenes import SCENES, configuration, needs_scenes
@@ -97,3 +97,23 @@ def test_a_configured_shift_is_taken_and_not_estimated(tmp_path: Path) -> None:
     assert result.run["channel_clocks"] == []
     load = result.channels.filter(pl.col("channel") == "load")
     assert load["t_s"][0] == pytest.approx(0.005, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_shift_is_left_out_that_an_exact_fit_finds_best(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    t, at = np.arange(0.0, 22.0, 0.1), np.arange(-3.0, 30.0, 0.07)
+    moved = record(t - 1.3) + rng.normal(0.0, 0.5, t.size)
+    pair = clocks._Pair(t, moved, at, record(at) + rng.normal(0.0, 0.3, at.size))
+    grid = np.arange(-15.0, 15.0, 0.1)
+    fits = [pair._fit(float(shift)) for shift in grid]
+    share = np.array([np.inf if fit is None else fit[1] for fit in fits])
+    screened = pair._screen(grid)
+    kept = screened.near_lowest_share()
+    assert kept[np.argmin(share)]
+    assert kept.sum() < 5
+    both = np.isfinite(share) & np.isfinite(screened.share)
+    assert both.sum() == np.isfinite(share).sum()  # what is not refused there is not refused here
+    assert np.abs(share[both] - screened.share[both]).max() < clock_screen.ROUNDING / 1000
+    square = np.array([np.inf if fit is None else fit[0] for fit in fits])
+    assert screened.about_lowest_square(10.0)[np.argmin(square)]

@@ -14,6 +14,7 @@ __all__ = [
     "BeamFeed",
     "BeamSeen",
     "CaptureScan",
+    "CellPass",
     "ContourCurves",
     "ContourPass",
     "DistancePass",
@@ -27,15 +28,19 @@ __all__ = [
     "__version__",
     "adjust_network",
     "arc_length",
+    "cell_heights",
+    "cell_positions",
     "check_captures",
     "curve_distances",
     "curve_points",
     "cut_capture",
     "dbscan",
     "dbscan_radii",
+    "echo_cells",
     "fit_line",
     "fit_plane",
     "fit_polynomial",
+    "hold_echoes",
     "line_clusters",
     "line_extremes",
     "pass_through",
@@ -99,6 +104,52 @@ class CaptureScan:
     def last_time_ns(self) -> int | None: ...
     def describe(self) -> dict[str, Any]: ...
     def health(self) -> dict[str, Any]: ...
+
+def hold_echoes(
+    scan: CaptureScan,
+    *,
+    lidars: Sequence[int],
+    start_ns: int,
+    stop_ns: int,
+    threads: int | None = None,
+) -> list[
+    tuple[NDArray[np.float32], NDArray[np.uint16], NDArray[np.float32], NDArray[np.float32]]
+]: ...
+def echo_cells(
+    ring: NDArray[np.uint16], azimuth_deg: NDArray[np.float32], grid: tuple[float, int, int]
+) -> NDArray[np.int64]: ...
+def cell_positions(
+    cells: NDArray[np.int64], xyz: NDArray[np.float32], size: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
+def cell_heights(
+    cells: NDArray[np.int64],
+    xyz: NDArray[np.float32],
+    plane: NDArray[np.int64],
+    height_m: NDArray[np.float64],
+    gate_m: NDArray[np.float64],
+    along: NDArray[np.float64],
+    beneath_m: NDArray[np.float64],
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]: ...
+
+@final
+class CellPass:
+    def __new__(
+        cls,
+        scan: CaptureScan,
+        *,
+        lidars: Sequence[int],
+        every: Sequence[int],
+        watched: Sequence[NDArray[np.bool_]],
+        grid: tuple[float, int, int],
+        start_ns: int,
+        stop_ns: int,
+        window_ns: int,
+    ) -> CellPass: ...
+    def advance(
+        self,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> list[tuple[int, NDArray[np.int64], NDArray[np.float32], int, int]] | None: ...
 
 @final
 class PointIterator(Iterator[dict[str, NDArray[Any]]]):

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from lidar_deflect.clock_screen import Screen
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from lidar_deflect.channels import Channel
 
@@ -31,6 +33,7 @@ _QUARTER_S = 900.0
 _MOST_QUARTERS = 14 * 4
 _COARSE_S = 0.1
 _FINE_S = 0.004
+_WINDOW_S = 0.1
 _SHARE = 0.5
 _EXPLAINED = 0.9
 _FEWEST = 20
@@ -127,6 +130,12 @@ class _Pair:
         return [0.0, *(each for each in quarters if self._overlap(each) >= _SHARE)]
 
     @cached_property
+    def _screen(self) -> Screen:
+        few = max(_FEWEST, _SHARE * self.t.size)
+        reach, spread = 0.3 * self._reach, 0.2 * self._spread
+        return Screen(self.t, self.d, self.channel_t, self.channel, few, reach, spread)
+
+    @cached_property
     def _reach(self) -> float:
         return float(np.ptp(self.d))
 
@@ -141,21 +150,17 @@ class _Pair:
         shorter = min(np.ptp(self.t), np.ptp(self.channel_t))
         return float((high - low) / shorter) if shorter > 0.0 else 0.0
 
-    def _fits(self, shifts_s: Floats) -> Iterator[tuple[float, tuple[float, float, Floats]]]:
-        """Fits at those of the shifts at which enough of both records lies together."""
-        first = np.searchsorted(self.t, self.channel_t[0] + shifts_s)
-        last = np.searchsorted(self.t, self.channel_t[-1] + shifts_s, side="right")
-        for k in np.flatnonzero(last - first >= max(_FEWEST, _SHARE * self.t.size)):
-            fit = self._fit(float(shifts_s[k]), slice(first[k], last[k]))
-            if fit is not None:
-                yield float(shifts_s[k]), fit
-
-    def _fit(self, shift_s: float, inside: slice) -> tuple[float, float, Floats] | None:
+    def _fit(self, shift_s: float) -> tuple[float, float, Floats] | None:
         """Mean square that a parabola in the deflection leaves, its share, and the residuals."""
-        d = self.d[inside]
+        at = self.t - shift_s
+        first = np.searchsorted(at, self.channel_t[0])
+        last = np.searchsorted(at, self.channel_t[-1], side="right")
+        if last - first < max(_FEWEST, _SHARE * self.t.size):
+            return None
+        d = self.d[first:last]
         if d.max() - d.min() < 0.3 * self._reach:
             return None
-        y = np.interp(self.t[inside] - shift_s, self.channel_t, self.channel)
+        y = np.interp(at[first:last], self.channel_t, self.channel)
         spread = float(np.var(y))
         if spread <= 0.2 * self._spread:
             return None
@@ -168,19 +173,21 @@ class _Pair:
     def best(self, low_s: float, high_s: float, step_s: float) -> tuple[float, float] | None:
         """Return the shift that leaves least, and what it leaves, on a grid."""
         grid = np.arange(low_s, high_s + 0.5 * step_s, step_s)
-        left = [(shift_s, fit[1]) for shift_s, fit in self._fits(grid)]
+        grid = grid[self._screen(grid).near_lowest_share()]
+        left = [(float(s), fit[1]) for s in grid if (fit := self._fit(float(s))) is not None]
         return min(left, key=lambda each: each[1], default=None)
 
     def refined(self, coarse_s: float) -> Shift | None:
         """Return the lowest point of the parabola through what is left near the best shift."""
         near = np.arange(coarse_s - 0.25, coarse_s + 0.2501, _FINE_S)
-        fits = list(self._fits(near))
+        near = near[self._screen(near).about_lowest_square(_WINDOW_S / _FINE_S)]
+        fits = [(s, fit) for s in near if (fit := self._fit(float(s))) is not None]
         if len(fits) < 5:
             return None
         shifts = np.array([s for s, _ in fits])
         squares = np.array([fit[0] for _, fit in fits])
         lowest = int(np.argmin(squares))
-        window = np.abs(shifts - shifts[lowest]) <= 0.1
+        window = np.abs(shifts - shifts[lowest]) <= _WINDOW_S
         a, b, _ = np.polyfit(shifts[window] - shifts[lowest], squares[window], 2)
         if a <= 0.0:
             return None

@@ -115,6 +115,10 @@ class OpenedTest:
             return self.limits_ns(start_s, stop_s)
         return unloaded.window_ns(self.config, self.capture, self.holds)
 
+    def hold(self, window_ns: tuple[int, int]) -> Mapping[str, HoldCloud]:
+        """Gather what every lidar sees in a hold."""
+        return unloaded.collect_all(self.capture, self.lidars, window_ns, self.threads)
+
     def unloaded_or_kept_ns(self, known: Calibration | None) -> tuple[int, int] | None:
         """Return the unloaded hold of these captures, None where the calibration's state serves."""
         kept = known is not None and "paper" in known.reference

@@ -30,7 +30,7 @@ from lidar_deflect.calibrate import calibrate
 from lidar_deflect.calibration import Calibration, with_reference
 from lidar_deflect.checks import check
 from lidar_deflect.errors import ConfigError
-from lidar_deflect.measurement import METHODS, beam, paper, tabulate, unloaded
+from lidar_deflect.measurement import METHODS, beam, paper, tabulate
 from lidar_deflect.measurement.health import health_table
 from lidar_deflect.opened import OpenedTest
 from lidar_deflect.result import Result
@@ -113,7 +113,7 @@ class Test:
         """
         opened = OpenedTest.of(self.config, paths, progress=progress, threads=threads)
         window = opened.unloaded_ns(start_s, stop_s)
-        clouds = unloaded.collect_all(opened.capture, opened.lidars, window)
+        clouds = opened.hold(window)
         calibration = calibrate(self.config, clouds)
         if not self.config.sections:
             return calibration
@@ -159,17 +159,20 @@ class Test:
         limits = opened.limits_ns(start_s, stop_s)
         watch.lap("scan")
         name = method or self.config.measure.method
-        inputs, states, drifted = self._states(opened, calibration, name, limits, rate_hz, watch)
-        matches = matching.match(opened, inputs, states)
-        shifts = matching.shifts_of(matches)
-        watch.lap("clocks")
-        if shifts:  # the load says where the unloaded hold is: look again by the right clock
-            opened = opened.with_shifts(shifts)
-            if self.config.load.file in shifts:
-                inputs, states, drifted = self._states(
-                    opened, calibration, name, limits, rate_hz, watch
-                )
-        return result_of(opened, inputs, states, drifted, name, watch, matches)
+        with provenance.FileFacts(opened.paths) as files:
+            inputs, states, drifted = self._states(
+                opened, calibration, name, limits, rate_hz, watch
+            )
+            matches = matching.match(opened, inputs, states)
+            shifts = matching.shifts_of(matches)
+            watch.lap("clocks")
+            if shifts:  # the load says where the unloaded hold is: look again by the right clock
+                opened = opened.with_shifts(shifts)
+                if self.config.load.file in shifts:
+                    inputs, states, drifted = self._states(
+                        opened, calibration, name, limits, rate_hz, watch
+                    )
+            return result_of(opened, inputs, states, drifted, name, watch, files, matches)
 
     def _states(
         self,
@@ -183,7 +186,7 @@ class Test:
         """Calibrate where that is still to be done, watch the tripods, measure by one method."""
         known = self._known(calibration, opened, opened.progress, opened.threads)
         window = opened.unloaded_or_kept_ns(known)
-        clouds = unloaded.collect_all(opened.capture, opened.lidars, window) if window else {}
+        clouds = opened.hold(window) if window else {}
         known = known or calibrate(self.config, clouds)
         if window and not limits[0] <= window[0] < window[1] <= limits[1]:
             known = with_unloaded_state(opened, known, clouds, window)
@@ -237,6 +240,7 @@ def result_of(
     drifted: Drift,
     method: str,
     watch: provenance.Stopwatch,
+    files: provenance.FileFacts,
     matches: Sequence[Match] = (),
 ) -> Result:
     """Tables and provenance of what a method found."""
@@ -271,7 +275,7 @@ def result_of(
         frames["cycles"] = found.table
     watch.lap("tables")
     run = provenance.run_document(
-        opened, inputs, states, method, health, watch, matches, drifted, found
+        opened, inputs, states, method, health, watch, files, matches, drifted, found
     )
     return Result(frames, run, opened.config, inputs.calibration)
 

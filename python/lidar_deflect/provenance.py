@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import threading
 import time
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -49,6 +50,7 @@ def run_document(
     method: str,
     health: pl.DataFrame,
     watch: Stopwatch,
+    files: FileFacts,
     matches: Sequence[Match] = (),
     drifted: Drift | None = None,
     swung: Found | None = None,
@@ -59,7 +61,7 @@ def run_document(
         "versions": versions(),
         "test": opened.config.test.id,
         "method": method,
-        "inputs": [file_facts(path) for path in opened.paths],
+        "inputs": files.wait(),
         "capture": opened.capture.info(),
         "absent_lidars": list(opened.absent),
         "calibration": {
@@ -93,13 +95,42 @@ def versions() -> Mapping[str, str]:
     }
 
 
-def file_facts(path: Path) -> Mapping[str, Any]:
-    """Name, size and SHA-256 of an input file."""
-    digest = hashlib.sha256()
-    with path.open("rb") as file:
-        while block := file.read(HASH_BLOCK):
-            digest.update(block)
-    return {"file": path.name, "bytes": path.stat().st_size, "sha256": digest.hexdigest()}
+class FileFacts:
+    """Name, size and SHA-256 of input files, found on a thread of its own within a ``with``."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self._paths = paths
+        self._found: list[Mapping[str, Any]] = []
+        self._failure: OSError | None = None
+        self._is_over = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._is_over.set()
+
+    def _run(self) -> None:
+        try:
+            self._found += [self._facts(path) for path in self._paths]
+        except OSError as failure:
+            self._failure = failure
+
+    def _facts(self, path: Path) -> Mapping[str, Any]:
+        digest = hashlib.sha256()
+        with path.open("rb") as file:
+            while not self._is_over.is_set() and (block := file.read(HASH_BLOCK)):
+                digest.update(block)
+        return {"file": path.name, "bytes": path.stat().st_size, "sha256": digest.hexdigest()}
+
+    def wait(self) -> list[Mapping[str, Any]]:
+        """Return the facts of every file, once they are there."""
+        self._thread.join()
+        if self._failure is not None:
+            raise self._failure
+        return self._found
 
 
 def gates(

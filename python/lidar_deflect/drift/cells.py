@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lidar_deflect import _native
 from lidar_deflect.drift.change import Change, estimate
 
 if TYPE_CHECKING:
@@ -43,6 +45,9 @@ FLOOR_M = 5e-4
 TURN = round(360 / STEP_DEG)
 MAX_RING = 1023
 """Channels beyond share their cells, which then are too rough to be watched."""
+
+GRID = (STEP_DEG, TURN, MAX_RING)
+"""How echoes fall into cells: channel, then azimuth."""
 
 
 @dataclass(frozen=True)
@@ -89,9 +94,9 @@ class Cells:
         """Find the static cells of a reference hold, seen from `pose` (world from sensor)."""
         key = keys(cloud)
         size = (int(key.max(initial=0)) // TURN + 1) * TURN
-        count = np.bincount(key, minlength=size)
-        sums = [np.bincount(key, cloud.xyz[:, k], size) for k in range(3)]
-        ray = (np.stack(sums, axis=1) / np.maximum(count, 1)[:, None]) @ pose[:3, :3].T
+        count, sums = _native.cell_positions(key, np.ascontiguousarray(cloud.xyz), size)
+        mean = np.ascontiguousarray(sums.T) / np.maximum(count, 1)[:, None]
+        ray = mean @ pose[:3, :3].T
         normals = np.array([plane.normal for plane in planes])
         offsets = np.array([plane.offset_m for plane in planes])
         plane = np.where(count < MIN_SEEN, -1, _plane_of(ray + pose[:3, 3], planes))
@@ -99,8 +104,7 @@ class Cells:
         cells = cls(plane, ray, start, start, count, normals, offsets, pose)
         for gate_m in (NEAR_M, 0.0):  # about the plane, then about that mean: movers drop out
             sums_ = Sums(cells, wider_m=gate_m)
-            watched = cells.watches(key)
-            sums_.add(key[watched], cloud.xyz[watched])
+            sums_.add(key, cloud.xyz)
             cells = sums_.as_reference()
         return cells._without_rough()
 
@@ -123,12 +127,17 @@ class Cells:
     def away_m(self, cell: NDArray[np.intp], xyz: NDArray[np.float32], pose: Floats) -> Floats:
         """How far above the reference echoes of watched cells lie, seen from `pose`, metres."""
         plane = self.plane[cell]
-        along_x, along_y, along_z = (self.normals @ pose[:3, :3]).T
-        beneath = (self.offsets_m - self.normals @ pose[:3, 3])[plane]
+        along, beneath = self.seen_from(pose)
+        along_x, along_y, along_z = along.T
         x, y, z = xyz.T  # column by column: rows of three are slow in numpy
-        height = x * along_x[plane] + y * along_y[plane] + z * along_z[plane] - beneath
+        height = x * along_x[plane] + y * along_y[plane] + z * along_z[plane] - beneath[plane]
         return np.asarray(height - self.height_m[cell])
 
+    def seen_from(self, pose: Floats) -> tuple[Floats, Floats]:
+        """Return normals of the planes in sensor axes, and how far along them the planes lie."""
+        return self.normals @ pose[:3, :3], self.offsets_m - self.normals @ pose[:3, 3]
+
+    @cached_property
     def gate_m(self) -> Floats:
         """How far from its cell's height an echo may lie, shape (cells,)."""
         return np.asarray(GATE_M + GATE_RAD * np.linalg.norm(self.ray_m, axis=1))
@@ -143,19 +152,20 @@ class Sums:
         size = len(cells.plane)
         self._cells = cells
         self._pose = cells.pose if pose is None else pose
-        self._gate_m = np.maximum(wider * cells.gate_m(), wider_m)
+        self._gate_m = np.maximum(wider * cells.gate_m, wider_m)
         self._count = np.zeros(size, dtype=np.intp)
         self._sum, self._squares = np.zeros(size), np.zeros(size)
 
     def add(self, cell: NDArray[np.intp], xyz: NDArray[np.float32]) -> None:
-        """Add echoes of watched cells."""
-        size = len(self._cells.plane)
-        away = self._cells.away_m(cell, xyz, self._pose)
-        clear = np.abs(away) < self._gate_m[cell]
-        cell, away = cell[clear], away[clear]
-        self._count += np.bincount(cell, minlength=size)
-        self._sum += np.bincount(cell, away, size)
-        self._squares += np.bincount(cell, away * away, size)
+        """Add echoes; those of cells that are not watched do not count."""
+        own, xyz = self._cells, np.ascontiguousarray(xyz)
+        along, beneath = own.seen_from(self._pose)
+        count, sums, squares = _native.cell_heights(
+            np.ascontiguousarray(cell), xyz, own.plane, own.height_m, self._gate_m, along, beneath
+        )
+        self._count += count
+        self._sum += sums
+        self._squares += squares
 
     def as_reference(self) -> Cells:
         """Return the cells with these heights as those of the reference."""
@@ -197,9 +207,9 @@ def patches(cells: Cells, seen: NDArray[np.intp]) -> NDArray[np.intp]:
 
 def keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
     """Cell of every echo: channel, then azimuth."""
-    azimuth = np.nan_to_num(echoes.azimuth_deg) / np.float32(STEP_DEG)
-    step = np.floor(azimuth).astype(np.intp) % TURN
-    return np.asarray(np.minimum(echoes.ring, MAX_RING).astype(np.intp) * TURN + step)
+    return _native.echo_cells(
+        np.ascontiguousarray(echoes.ring), np.ascontiguousarray(echoes.azimuth_deg), GRID
+    )
 
 
 def _plane_of(points_m: Floats, planes: Sequence[Plane]) -> NDArray[np.intp]:

@@ -118,8 +118,9 @@ def estimate(
         left = seen - design @ step
         scale = max(1.0, MAD_TO_SIGMA * float(np.median(np.abs(left))))
         weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-9)) / scale**2
-        normal_matrix = (design * weight[:, None]).T @ design + np.diag(PRIOR**-2)
-        step = np.asarray(np.linalg.solve(normal_matrix, (design * weight[:, None]).T @ seen))
+        weighted = (design * weight[:, None]).T
+        normal_matrix = weighted @ design + np.diag(PRIOR**-2)
+        step = np.asarray(np.linalg.solve(normal_matrix, weighted @ seen))
     covariance = np.asarray(np.linalg.inv(normal_matrix))
     if patch is None:
         return Change(step, covariance)

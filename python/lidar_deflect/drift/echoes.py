@@ -22,17 +22,29 @@ MOST = 1_000_000
 
 
 @dataclass(frozen=True)
-class Kept:
+class Echoes:
     """Echoes on watched cells.
 
     Attributes
     ----------
-    cell, xyz, time_ns
-        Number of the cell, place in the sensor frame, instant: shapes (n,), (n, 3), (n,).
+    cell, xyz
+        Number of the cell, place in the sensor frame: shapes (n,), (n, 3).
     """
 
     cell: NDArray[np.intp]
     xyz: NDArray[np.float32]
+
+    @classmethod
+    def thinned(cls, cell: NDArray[np.intp], xyz: NDArray[np.float32]) -> Echoes:
+        """At most `MOST` of these."""
+        every = max(1, len(cell) // MOST)
+        return cls(cell[::every], xyz[::every])
+
+
+@dataclass(frozen=True)
+class Kept(Echoes):
+    """The same with the instant of each, shape (n,)."""
+
     time_ns: NDArray[np.int64]
 
     @classmethod

@@ -52,7 +52,7 @@ def _gains(
     """Instants in order, and how much better each echo fits the new pose."""
     cell = echoes.cell
     before, after = (cells.away_m(cell, echoes.xyz, pose) for pose in (old, new))
-    clear = np.fmin(np.abs(before), np.abs(after)) < cells.gate_m()[cell]
+    clear = np.fmin(np.abs(before), np.abs(after)) < cells.gate_m[cell]
     order = np.argsort(echoes.time_ns[clear], kind="stable")
     scatter = cells.sigma_m[cell[clear]]
     scatter = np.maximum(scatter, 0.5 * float(np.median(scatter))) if scatter.size else scatter

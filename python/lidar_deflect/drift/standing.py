@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from lidar_deflect.drift.cells import Cells
-    from lidar_deflect.drift.echoes import Kept
+    from lidar_deflect.drift.echoes import Echoes
 
     Floats = NDArray[np.float64]
 
@@ -81,7 +81,7 @@ class Standing:
         self._sums: Sums | None = None  # of the present stay, None for the calibrated place
         self._doubt: int | None = None  # number of the window that showed it elsewhere
 
-    def look(self, echoes: Kept, start_ns: int, stop_ns: int) -> None:
+    def look(self, echoes: Echoes, start_ns: int, stop_ns: int) -> None:
         """Take the next window."""
         found = self._found(echoes)
         if found is None:
@@ -135,7 +135,7 @@ class Standing:
             stay.pose, stay.covariance = moved_by(stay.pose, change.step), change.covariance
         self._sums = None
 
-    def _found(self, echoes: Kept) -> tuple[Floats, Floats] | None:
+    def _found(self, echoes: Echoes) -> tuple[Floats, Floats] | None:
         """Pose in a window, and its covariance; None where too little was seen."""
         pose = self.stays[-1].pose
         sums = Sums(self.cells, pose)
@@ -149,7 +149,7 @@ class Standing:
         return None if change is None else (moved_by(pose, change.step), change.covariance)
 
 
-def found_again(cells: Cells, echoes: Kept, pose: Floats) -> tuple[Floats, Floats, int] | None:
+def found_again(cells: Cells, echoes: Echoes, pose: Floats) -> tuple[Floats, Floats, int] | None:
     """Look for a lidar farther off than a window's gates: pose, covariance, number of cells."""
     found = None
     for wider in WIDER:

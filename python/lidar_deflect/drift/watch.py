@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lidar_deflect import _native
 from lidar_deflect.drift import told
-from lidar_deflect.drift.cells import MIN_CELLS, Cells, Plane
-from lidar_deflect.drift.echoes import Kept
+from lidar_deflect.drift.cells import GRID, MIN_CELLS, Cells, Plane
+from lidar_deflect.drift.echoes import Echoes, Kept
 from lidar_deflect.drift.instant import instant_ns
 from lidar_deflect.drift.move import Move
 from lidar_deflect.drift.standing import Standing, found_again
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     import polars as pl
     from numpy.typing import NDArray
 
-    from lidar_deflect.capture import Sweep
     from lidar_deflect.drift.standing import Stay
     from lidar_deflect.measurement import Inputs
     from lidar_deflect.network import Surface
@@ -68,26 +68,6 @@ class Drift:
     facts: Mapping[str, Any]
     moves: tuple[Move, ...] = ()
     unsure: tuple[tuple[str | None, int, int], ...] = ()
-
-
-class _Window:
-    """One lidar's window while it lasts."""
-
-    def __init__(self, cells: Cells, number: int) -> None:
-        self.number = number
-        self._cells = cells
-        self._parts: list[Kept] = []
-        self._edges_ns: list[int] = []
-
-    def add(self, sweep: Sweep) -> None:
-        """Add one of the sweeps that are looked at."""
-        self._parts.append(Kept.of(sweep, self._cells))
-        self._edges_ns += [sweep.start_ns, sweep.end_ns]
-
-    def close(self, standing: Standing) -> None:
-        """Hand over what was seen."""
-        if self._parts:
-            standing.look(Kept.joined(self._parts), min(self._edges_ns), max(self._edges_ns))
 
 
 def watch(inputs: Inputs) -> Drift:
@@ -152,20 +132,23 @@ def _reach_m(surface: Surface) -> float:
 
 
 def _pass(inputs: Inputs, watched: Mapping[str, Standing]) -> None:
-    """Gather the sweeps of every window, and look at it when it is over."""
-    start_s, stop_s = _seconds(inputs, (inputs.start_ns, inputs.stop_ns))
-    running: dict[str, _Window] = {}
-    every = {lidar: _one_in(inputs, lidar) for lidar in watched}
-    for sweep in inputs.capture.sweeps(list(watched), start_s=start_s, stop_s=stop_s, every=every):
-        lidar, number = sweep.lidar, (sweep.start_ns - inputs.start_ns) // WINDOW_NS
-        if lidar not in running or running[lidar].number != number:
-            if lidar in running:
-                running[lidar].close(watched[lidar])
-            running[lidar] = _Window(watched[lidar].cells, number)
-        running[lidar].add(sweep)
-    for lidar, window in running.items():
-        window.close(watched[lidar])
-        watched[lidar].finish()
+    """Gather some sweeps of every window, and look at it when it is over."""
+    standings = list(watched.values())
+    windows = _native.CellPass(
+        inputs.capture.native,
+        lidars=inputs.capture.numbers(list(watched)),
+        every=[_one_in(inputs, lidar) for lidar in watched],
+        watched=[standing.cells.plane >= 0 for standing in standings],
+        grid=GRID,
+        start_ns=inputs.start_ns,
+        stop_ns=inputs.stop_ns,
+        window_ns=WINDOW_NS,
+    )
+    while (ready := windows.advance(inputs.threads)) is not None:
+        for place, cell, xyz, from_ns, to_ns in ready:
+            standings[place].look(Echoes.thinned(cell, xyz), from_ns, to_ns)
+    for standing in standings:
+        standing.finish()
 
 
 def _one_in(inputs: Inputs, lidar: str) -> int:

@@ -43,6 +43,10 @@ WALL_MARGIN_M = 1.0
 MIN_BLADE_POINTS = 100
 OUTLIERS_PERCENT = 0.5
 
+_ROWS = 16_384
+"""Points that are turned at a time: beyond, OpenBLAS shares the product out to threads, which may
+take fifty times as long for rows of three."""
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -96,11 +100,7 @@ class Plan:
 
 def make_plan(config: Config, calibration: Calibration, clouds: Mapping[str, HoldCloud]) -> Plan:
     """Settle what the configuration leaves open, from the unloaded hold."""
-    world = {
-        lidar: _to_world(cloud.xyz, calibration.pose(lidar).world_from_sensor)
-        for lidar, cloud in clouds.items()
-    }
-    blade = _near_blade(config, calibration, world)
+    blade = _near_blade(config, calibration, clouds)
     leading_edge, warnings = _chord_direction(config, blade)
     return Plan(
         box_m=_box(config, blade),
@@ -116,19 +116,22 @@ def make_plan(config: Config, calibration: Calibration, clouds: Mapping[str, Hol
 
 
 def _to_world(xyz: NDArray[np.float32], pose: Floats) -> NDArray[np.float32]:
-    moved = xyz @ pose[:3, :3].T.astype(np.float32)
+    turn, moved = pose[:3, :3].T.astype(np.float32), np.empty_like(xyz)
+    for first in range(0, len(xyz), _ROWS):
+        np.matmul(xyz[first : first + _ROWS], turn, out=moved[first : first + _ROWS])
     for axis, step_m in enumerate(pose[:3, 3].astype(np.float32)):
         moved[:, axis] += step_m  # column by column: rows of three are slow in numpy
     return np.asarray(moved, dtype=np.float32)
 
 
 def _near_blade(
-    config: Config, calibration: Calibration, world: Mapping[str, NDArray[np.float32]]
+    config: Config, calibration: Calibration, clouds: Mapping[str, HoldCloud]
 ) -> Floats:
     """Points of the unloaded hold that lie near the z axis and well above the ground."""
     reach = max(NEAR_AXIS_MIN_M, NEAR_AXIS * config.blade.length_m)
     parts = []
-    for lidar, xyz in world.items():
+    for lidar, cloud in clouds.items():
+        xyz = _to_world(cloud.xyz, calibration.pose(lidar).world_from_sensor)
         ground = calibration.pose(lidar).evidence.get("ground_height_m")
         floor = -reach if ground is None else max(-reach, float(ground) + CLEARANCE_M)
         near = (
@@ -221,6 +224,7 @@ def _angular_step(clouds: Mapping[str, HoldCloud]) -> float:
 def _azimuth_below(cloud: HoldCloud, world_from_sensor: Floats) -> float:
     """Azimuth of the echo nearest to straight below, whatever the sensor's sense of turn."""
     down = world_from_sensor[:3, :3].T @ -UP
-    range_m = np.linalg.norm(cloud.xyz, axis=1)
+    x, y, z = cloud.xyz.T  # column by column: rows of three are slow in numpy
+    range_m = np.sqrt((x * x + y * y) + z * z)
     cosine = (cloud.xyz @ down.astype(np.float32)) / np.maximum(range_m, 1e-6)
     return float(cloud.azimuth_deg[np.argmax(cosine)])

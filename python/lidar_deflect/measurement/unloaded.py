@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
+from lidar_deflect import _native
 from lidar_deflect.errors import MeasurementError
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    import numpy as np
     from numpy.typing import NDArray
 
     from lidar_deflect.capture import Capture
@@ -94,29 +94,41 @@ def collect(capture: Capture, lidar: str, window: tuple[int, int]) -> HoldCloud:
     MeasurementError
         If the lidar sent nothing in it.
     """
-    first = capture.first_time_ns
-    start_s, stop_s = ((edge - first) * 1e-9 for edge in window)
-    sweeps = list(capture.sweeps(lidar, start_s=start_s, stop_s=stop_s))
-    if not any(len(sweep.xyz) for sweep in sweeps):
-        raise MeasurementError(
-            f"lidar {lidar} sent no echo in the reference hold",
-            code="measurement.no_echo",
-            facts=[("hold", f"{start_s:.3f} s to {stop_s:.3f} s")],
-            hint="see what it sent: lidar-deflect info CAPTURE",
-        )
-    return HoldCloud(
-        np.concatenate([sweep.xyz for sweep in sweeps]),
-        np.concatenate([sweep.ring for sweep in sweeps]),
-        np.concatenate([sweep.azimuth_deg for sweep in sweeps]),
-        np.concatenate([sweep.intensity for sweep in sweeps]).astype(np.float32),
-    )
+    return collect_all(capture, [lidar], window)[lidar]
 
 
 def collect_all(
-    capture: Capture, lidars: Sequence[str], window: tuple[int, int]
+    capture: Capture,
+    lidars: Sequence[str],
+    window: tuple[int, int],
+    threads: int | None = None,
 ) -> Mapping[str, HoldCloud]:
-    """Gather the hold of every lidar."""
-    return {lidar: collect(capture, lidar, window) for lidar in lidars}
+    """Gather the hold of every lidar, in one reading.
+
+    Raises
+    ------
+    MeasurementError
+        If one of them sent nothing in it.
+    """
+    numbers, (start_ns, stop_ns) = capture.numbers(lidars), window
+    columns = _native.hold_echoes(
+        capture.native, lidars=numbers, start_ns=start_ns, stop_ns=stop_ns, threads=threads
+    )
+    clouds = {lidar: HoldCloud(*own) for lidar, own in zip(lidars, columns, strict=True)}
+    for lidar, cloud in clouds.items():
+        if not len(cloud.xyz):
+            raise _without_echo(capture, lidar, window)
+    return clouds
+
+
+def _without_echo(capture: Capture, lidar: str, window: tuple[int, int]) -> MeasurementError:
+    start_s, stop_s = ((edge - capture.first_time_ns) * 1e-9 for edge in window)
+    return MeasurementError(
+        f"lidar {lidar} sent no echo in the reference hold",
+        code="measurement.no_echo",
+        facts=[("hold", f"{start_s:.3f} s to {stop_s:.3f} s")],
+        hint="see what it sent: lidar-deflect info CAPTURE",
+    )
 
 
 def _ns(seconds: float) -> int:

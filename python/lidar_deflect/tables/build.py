@@ -118,14 +118,22 @@ def _series(table: Table, column: Column, values: Values, length: int) -> pl.Ser
     if values is None:
         series = pl.Series(column.name, [None] * length, dtype=column.dtype)
     else:
-        series = _cast(table, column, pl.Series(column.name, _listed(values), strict=False))
+        series = _cast(table, column, _plain(column.name, _listed(values)))
     _check_nulls(table, column, series)
     return series
 
 
+def _plain(name: str, values: pl.Series | npt.NDArray[np.generic] | list[object]) -> pl.Series:
+    """Return a series without NaN; an array is looked through as it is taken over."""
+    if isinstance(values, np.ndarray):
+        return pl.Series(name, values, strict=False, nan_to_null=True)
+    series = pl.Series(name, values, strict=False)
+    return series.fill_nan(None) if series.dtype.is_float() else series
+
+
 def _cast(table: Table, column: Column, series: pl.Series) -> pl.Series:
-    if series.dtype.is_float():
-        series = series.fill_nan(None)
+    if series.dtype == column.dtype:
+        return series
     try:
         if isinstance(column.dtype, pl.Datetime):
             return _instants(series)

@@ -49,6 +49,25 @@ pub struct Return {
     pub block: u16,
 }
 
+#[cfg(test)]
+impl Return {
+    /// An echo for tests, at a place and an instant; the rest to be changed where it matters.
+    pub(crate) fn made_up(xyz_m: [f32; 3], time: Timestamp) -> Self {
+        Self {
+            xyz_m,
+            time,
+            range_m: 1.0,
+            azimuth_rad: 0.0,
+            ring: 0,
+            intensity: 1,
+            return_index: 0,
+            return_kind: ReturnKind::Strongest,
+            packet: 0,
+            block: 0,
+        }
+    }
+}
+
 /// Echoes in frame `F`, one column per quantity.
 #[derive(Debug, Clone)]
 pub struct PointCloud<F> {
@@ -181,8 +200,13 @@ impl<F> PointCloud<F> {
 
     /// Azimuths in degrees, [0, 360).
     pub fn azimuth_deg(&self) -> Vec<f32> {
+        self.azimuths_deg().collect()
+    }
+
+    /// The same, one by one.
+    pub fn azimuths_deg(&self) -> impl Iterator<Item = f32> {
         let degrees = |azimuth_rad: &f32| f64::from(*azimuth_rad).to_degrees() as f32;
-        self.azimuth_rad.iter().map(degrees).collect()
+        self.azimuth_rad.iter().map(degrees)
     }
 
     /// Meanings of the returns as numbers: the place of each in the declaration of [`ReturnKind`].

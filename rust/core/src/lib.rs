@@ -19,6 +19,7 @@ pub mod loss;
 pub mod packet;
 pub mod stream;
 pub mod sweep;
+pub mod watch;
 
 pub mod fit;
 pub mod neighbors;

@@ -4,15 +4,14 @@
 #[path = "support/puck.rs"]
 mod puck;
 
-use lidar_deflect_core::capture::{Datagram, DatagramBatch};
 use lidar_deflect_core::clock::ClockKind;
 use lidar_deflect_core::cloud::ReturnKind;
 use lidar_deflect_core::packet::ReturnMode;
 use lidar_deflect_core::packet::velodyne::puck::BLOCK_NS;
-use lidar_deflect_core::stream::{Scan, ScanOptions, SweepOptions};
+use lidar_deflect_core::stream::{ScanOptions, SweepOptions};
 use lidar_deflect_core::sweep::Sweep;
 use lidar_deflect_core::time::Timestamp;
-use puck::{Puck, START_NS, Sent, datagram, in_order, read, scan, sweeps};
+use puck::{Puck, START_NS, Sent, in_order, read, scan, sweeps};
 
 /// Half of the encoder's step of 0.01 degree, a little more for the rate between rows.
 const AZIMUTH_TOLERANCE_DEG: f64 = 0.011;
@@ -440,40 +439,4 @@ fn several_lidars_come_out_merged() {
     }
     // As they complete: no sweep waits for the end of the capture.
     assert!(sweeps[..50].is_sorted_by(|a, b| a.end.0 <= b.end.0 + 20_000_000));
-}
-
-#[test]
-fn a_scan_of_batches_says_what_a_scan_of_single_datagrams_says() {
-    let mut sent = Puck::default().packets(30.0);
-    // A pause of the recording, losses, and a packet that comes twice.
-    sent.retain(|packet| !(5_000..19_000).contains(&((packet.arrival_ns - START_NS) / 1_000_000)));
-    sent = sent
-        .into_iter()
-        .enumerate()
-        .filter(|(k, _)| scattered(*k, 100) > 2)
-        .map(|(_, p)| p)
-        .collect();
-    sent.insert(70, sent[60].clone());
-    let from = |number: u8, packet| Datagram {
-        source: ([192, 168, 1, number], 2368).into(),
-        ..datagram(packet)
-    };
-    let foreign = Datagram {
-        payload: b"neither lidar nor anything else",
-        ..from(9, &sent[0])
-    };
-    let both = |packet| [from(1, packet), from(2, packet)];
-    let all: Vec<Datagram<'_>> = sent.iter().flat_map(both).chain([foreign]).collect();
-    let mut single = Scan::new(ScanOptions::default());
-    all.iter().for_each(|datagram| single.push(datagram));
-    let mut joined = Scan::new(ScanOptions::default());
-    for part in all.chunks(500) {
-        let mut batch = DatagramBatch::default();
-        part.iter().for_each(|datagram| batch.push(datagram));
-        joined.push_batch(&batch);
-    }
-    let (single, joined) = (single.finish(), joined.finish());
-    assert_eq!((single.lidars.len(), single.pauses.len()), (2, 1));
-    assert!(single.lidars.iter().all(|lidar| lidar.counts.lost > 10));
-    assert_eq!(format!("{single:?}"), format!("{joined:?}"));
 }

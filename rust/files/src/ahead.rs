@@ -26,7 +26,9 @@ pub(crate) enum Ahead {
 }
 
 struct Chunk {
-    bytes: io::Result<Vec<u8>>,
+    /// How many bytes of the buffer count: it keeps its length, as what is cut off would be zeroed anew.
+    count: io::Result<usize>,
+    bytes: Vec<u8>,
     packed_bytes: u64,
 }
 
@@ -36,6 +38,7 @@ pub(crate) struct Taker {
     emptied: SyncSender<Vec<u8>>,
     bytes: Vec<u8>,
     taken: usize,
+    count: usize,
     packed_bytes: u64,
 }
 
@@ -91,22 +94,24 @@ impl Taker {
             emptied,
             bytes: Vec::new(),
             taken: 0,
+            count: 0,
             packed_bytes,
         })
     }
 
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        if self.taken == self.bytes.len() {
+        if self.taken == self.count {
             let chunks = self.chunks.get_mut().map_err(|_| ErrorKind::Other)?;
             let Ok(chunk) = chunks.recv() else {
                 return Ok(0); // the thread has told the end, and is gone
             };
             self.packed_bytes = chunk.packed_bytes;
-            let used = std::mem::replace(&mut self.bytes, chunk.bytes?);
+            (self.taken, self.count) = (0, 0);
+            self.count = chunk.count?;
+            let used = std::mem::replace(&mut self.bytes, chunk.bytes);
             let _ = self.emptied.try_send(used);
-            self.taken = 0;
         }
-        let count = into.len().min(self.bytes.len() - self.taken);
+        let count = into.len().min(self.count - self.taken);
         into[..count].copy_from_slice(&self.bytes[self.taken..][..count]);
         self.taken += count;
         Ok(count)
@@ -118,16 +123,16 @@ fn unpack(mut reader: Box<dyn Packed>, sender: &SyncSender<Chunk>, empty: &Recei
     loop {
         let mut bytes = empty.try_recv().unwrap_or_default();
         bytes.resize(CHUNK_BYTES, 0);
-        let bytes = match reader.read(&mut bytes) {
-            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
-            read => read.map(|count| {
-                bytes.truncate(count);
-                bytes
-            }),
+        let count = loop {
+            match reader.read(&mut bytes) {
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                read => break read,
+            }
         };
-        let is_last = !matches!(&bytes, Ok(bytes) if !bytes.is_empty());
+        let is_last = !matches!(count, Ok(1..));
         let packed_bytes = reader.packed_bytes();
         let chunk = Chunk {
+            count,
             bytes,
             packed_bytes,
         };

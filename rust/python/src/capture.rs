@@ -4,19 +4,19 @@ mod columns;
 mod cut;
 mod describe;
 pub mod feed;
+mod hold;
 mod points;
+pub mod reading;
 mod sweeps;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use lidar_deflect_core::capture::DatagramBatch;
 use lidar_deflect_core::packet::{self, unit::UnitFile};
 use lidar_deflect_core::stream::{Given, Scan, ScanOptions, ScanReport, Source};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::compute::pool_of;
 use crate::error::BorderResult;
 use feed::Feed;
 
@@ -117,15 +117,11 @@ fn scan_once(
 ) -> BorderResult<(ScanReport, feed::FilesReport)> {
     let mut feed = Feed::open(py, paths)?;
     let mut scan = Scan::new(options);
-    let pool = pool_of(None)?;
-    let (mut batch, mut ahead) = (DatagramBatch::default(), DatagramBatch::default());
-    loop {
-        feed.batch(py, &pool, progress, &mut ahead, || scan.push_batch(&batch))?;
-        std::mem::swap(&mut batch, &mut ahead);
-        if batch.is_empty() {
-            break;
-        }
-    }
+    // One by one: what a scan does to a packet is less than putting it aside for another thread.
+    while feed.block(py, progress, |datagram| {
+        scan.push(datagram);
+        feed::Want::More
+    })? {}
     let report = py.detach(|| scan.finish());
     Ok((report, feed.report()))
 }
@@ -206,6 +202,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<sweeps::SweepIterator>()?;
     module.add_class::<points::PointIterator>()?;
     module.add_function(wrap_pyfunction!(cut::cut_capture, module)?)?;
+    module.add_function(wrap_pyfunction!(hold::hold_echoes, module)?)?;
     module.add_function(wrap_pyfunction!(scan_capture, module)?)?;
     module.add_function(wrap_pyfunction!(scan_quickly, module)?)?;
     module.add_function(wrap_pyfunction!(check_captures, module)?)?;

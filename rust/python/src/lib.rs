@@ -16,6 +16,7 @@ mod fit;
 mod paper;
 mod register;
 mod synthetic;
+mod watch;
 
 use pyo3::prelude::*;
 
@@ -29,5 +30,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     paper::register(module)?;
     register::register(module)?;
     synthetic::register(module)?;
+    watch::register(module)?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))
 }

@@ -77,7 +77,7 @@ fn weighted(
     let parts = turns
         .map(|t| t / APART.1)
         .chain(places.map(|p| p / APART.0));
-    parts.flat_map(|part| <[f64; 3]>::from(part)).collect()
+    parts.flat_map(<[f64; 3]>::from).collect()
 }
 
 /// Amounts of the fields, in standard deviations, that come nearest to a deviation.

@@ -181,7 +181,7 @@ pub fn share_of(sweep: &Sweep, stands: &Stands, pass: &PassThrough) -> (Timestam
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::{PointCloud, Return, ReturnKind};
+    use crate::cloud::{PointCloud, Return};
     use crate::frame::WorldFromSensor;
     use nalgebra::{Rotation3, Vector3};
 
@@ -191,17 +191,10 @@ mod tests {
     fn sweep(lidar: usize, middle: i64, gaps: Vec<Gap>) -> Sweep {
         let mut cloud = PointCloud::default();
         for k in 0..5i64 {
+            let time = Timestamp(middle + (k - 2) * 1_000_000);
             cloud.push(&Return {
-                xyz_m: [1.0 + k as f32, 0.0, 0.0],
-                time: Timestamp(middle + (k - 2) * 1_000_000),
-                range_m: 1.0,
-                azimuth_rad: 0.0,
                 ring: k as u16,
-                intensity: 1,
-                return_index: 0,
-                return_kind: ReturnKind::Strongest,
-                packet: 0,
-                block: 0,
+                ..Return::made_up([1.0 + k as f32, 0.0, 0.0], time)
             });
         }
         Sweep {

@@ -1,14 +1,13 @@
 //! Frames out of datagrams: every lidar's packets, sweeps and shares on a thread of their own.
 
-use rayon::prelude::*;
-
 use super::frames::{Frame, FrameAssembler, Share, share_of};
 use super::passthrough::PassThrough;
 use crate::capture::DatagramBatch;
 use crate::error::{InvalidValue, ReadError};
 use crate::frame::WorldFromSensor;
 use crate::stand::{Move, Stands};
-use crate::stream::{ScanReport, SweepOptions, SweepReader};
+use crate::stream::{Beside, Reading, ScanReport, SweepOptions, Taker};
+use crate::sweep::Sweep;
 use crate::time::Timestamp;
 
 /// Sweeps before a frame that its shares may need, and the decoder to have got going.
@@ -61,14 +60,14 @@ impl FramePlan {
 
 /// Turns batches of datagrams into frames; the frames do not depend on the number of threads.
 pub struct FrameReader {
-    lanes: Vec<Lane>,
-    pass: PassThrough,
+    lidars: Beside<ShareTaker>,
     assembler: FrameAssembler,
 }
 
-struct Lane {
-    reader: SweepReader,
+/// Makes shares of one lidar's sweeps.
+struct ShareTaker {
     stands: Stands,
+    pass: PassThrough,
     shares: Vec<(Timestamp, Share)>,
 }
 
@@ -81,46 +80,23 @@ impl FrameReader {
         let count = plan.lidars.len();
         check_length("poses", plan.poses.len(), count)?;
         check_length("cut_azimuth_rad", plan.cut_azimuth_rad.len(), count)?;
-        let stands = Stands::of(&plan.poses, &plan.moves)?;
-        let lane = |place: usize| {
-            Ok(Lane {
-                reader: SweepReader::new(report, &plan.options(place, &stands[place]))?,
-                stands: stands[place].clone(),
-                shares: Vec::new(),
-            })
+        let lidar = |(place, stands): (usize, Stands)| {
+            let options = plan.options(place, &stands);
+            let (pass, shares) = (plan.pass, Vec::new());
+            (
+                options,
+                ShareTaker {
+                    stands,
+                    pass,
+                    shares,
+                },
+            )
         };
+        let stands = Stands::of(&plan.poses, &plan.moves)?.into_iter();
         Ok(Self {
-            lanes: (0..count).map(lane).collect::<Result<_, ReadError>>()?,
-            pass: plan.pass,
+            lidars: Beside::new(report, stands.enumerate().map(lidar))?,
             assembler: FrameAssembler::new(count, plan.first, plan.period_ns)?,
         })
-    }
-
-    /// Takes the next datagrams, lidars side by side.
-    pub fn push(&mut self, batch: &DatagramBatch) {
-        let pass = &self.pass;
-        self.lanes.par_iter_mut().for_each(|lane| {
-            for datagram in batch.iter() {
-                lane.reader.push(&datagram);
-                lane.take(pass);
-            }
-        });
-        self.assemble();
-    }
-
-    /// The capture has ended: what is not complete comes out.
-    pub fn finish(&mut self) {
-        for lane in &mut self.lanes {
-            lane.reader.finish();
-            lane.take(&self.pass);
-        }
-        self.assemble();
-        self.assembler.finish();
-    }
-
-    /// Whether all lidars have passed the end that was asked for.
-    pub fn is_done(&self) -> bool {
-        self.lanes.iter().all(|lane| lane.reader.is_done())
     }
 
     /// The next frame, when no later sweep can be nearer to it.
@@ -129,20 +105,34 @@ impl FrameReader {
     }
 
     fn assemble(&mut self) {
-        for (place, lane) in self.lanes.iter_mut().enumerate() {
-            for (middle, share) in lane.shares.drain(..) {
+        for (place, taker) in self.lidars.takers().enumerate() {
+            for (middle, share) in taker.shares.drain(..) {
                 self.assembler.push(place, middle, share);
             }
         }
     }
 }
 
-impl Lane {
-    fn take(&mut self, pass: &PassThrough) {
-        while let Some(sweep) = self.reader.pop() {
-            self.shares.push(share_of(&sweep, &self.stands, pass));
-            self.reader.recycle(sweep.lidar, sweep.cloud);
-        }
+impl Reading for FrameReader {
+    fn push(&mut self, batch: &DatagramBatch) {
+        self.lidars.push(batch);
+        self.assemble();
+    }
+
+    fn is_done(&self) -> bool {
+        self.lidars.is_done()
+    }
+
+    fn finish(&mut self) {
+        self.lidars.finish();
+        self.assemble();
+        self.assembler.finish();
+    }
+}
+
+impl Taker for ShareTaker {
+    fn take(&mut self, sweep: &Sweep) {
+        self.shares.push(share_of(sweep, &self.stands, &self.pass));
     }
 }
 

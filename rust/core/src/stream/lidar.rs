@@ -26,7 +26,7 @@ const NEIGHBOUR: i64 = 4;
 const CROWDED: f64 = 1.3;
 
 /// What all lidars of a capture have in common.
-#[derive(Debug, Default, Clone)]
+#[derive(Debug, Default)]
 pub struct Shared {
     /// UTC of the first lidar packet as far as it can be told: where seconds are counted from.
     pub origin: Option<Timestamp>,

@@ -4,7 +4,9 @@
 //! arrived and judges their clocks; [`SweepReader`] then turns the same datagrams into sweeps.
 
 mod arrivals;
+mod beside;
 mod cut;
+mod hold;
 mod keys;
 mod lidar;
 mod points;
@@ -21,7 +23,9 @@ use crate::error::InvalidValue;
 use crate::packet::unit::UnitFile;
 use crate::packet::{ModelRef, pieces, unit_models};
 
+pub use beside::{Beside, Reading, Taker};
 pub use cut::CaptureCut;
+pub use hold::HoldEchoes;
 pub use points::{PointBlock, PointReader, PointTagger};
 pub use reader::{Reader, Sink, SweepOptions, SweepReader};
 pub use report::{Health, OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};

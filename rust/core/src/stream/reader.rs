@@ -50,6 +50,12 @@ impl SweepOptions {
         }
     }
 
+    /// The same where of each lidar one turn in so many is wanted.
+    pub fn one_in(mut self, every: u32) -> Self {
+        self.every = vec![every; self.cut_azimuth_rad.len()];
+        self
+    }
+
     /// The same where of each of these lidars only returns within its bearings are wanted.
     pub fn towards(
         mut self,

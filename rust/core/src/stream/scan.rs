@@ -3,14 +3,12 @@
 use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 
-use rayon::prelude::*;
-
 use super::keys::KeyHasher;
 use super::lidar::{Lidar, Shared};
 use super::probe::Probe;
 use super::report::{OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
 use super::{ScanOptions, StreamKey, packets};
-use crate::capture::{Datagram, DatagramBatch};
+use crate::capture::Datagram;
 use crate::drops::Drops;
 use crate::packet::unit::UnitFile;
 use crate::packet::velodyne::position::{Position, Pps};
@@ -24,13 +22,11 @@ const MAX_STREAMS: usize = 4096;
 /// Foreign datagrams before a stream is decided whose second is remembered.
 const MAX_EARLY: usize = 1024;
 
-type ByKey<T> = HashMap<StreamKey, T, BuildHasherDefault<KeyHasher>>;
-
 /// Sums over the streams of a capture.
 #[derive(Debug)]
 pub struct Scan {
     options: ScanOptions,
-    streams: ByKey<Stream>,
+    streams: HashMap<StreamKey, Stream, BuildHasherDefault<KeyHasher>>,
     shared: Shared,
     datagrams: u64,
     unfollowed: u64,
@@ -83,52 +79,18 @@ impl Scan {
         }
     }
 
-    /// Takes the next datagrams, streams side by side: sums do not depend on the number of threads.
-    pub fn push_batch(&mut self, batch: &DatagramBatch) {
-        let datagrams: Vec<Datagram<'_>> = batch.iter().collect();
-        if self.shared.origin.is_none() {
-            // The first lidar packet of all says where seconds are counted from.
-            return datagrams.iter().for_each(|datagram| self.push(datagram));
-        }
-        let mut waiting: ByKey<Vec<Datagram<'_>>> = HashMap::default();
-        for packet in datagrams.iter().flat_map(packets) {
-            if let Some(key) = self.admit(&packet) {
-                let probe = || Stream::new(self.options.probe(&key), &packet);
-                self.streams.entry(key).or_insert_with(probe);
-                waiting.entry(key).or_default().push(packet);
-            }
-        }
-        let streams = self.streams.iter_mut();
-        let busy = streams.filter_map(|(key, stream)| Some((stream, waiting.remove(key)?)));
-        let busy: Vec<_> = busy.collect();
-        busy.into_par_iter().for_each(|(stream, packets)| {
-            let mut shared = self.shared.clone();
-            packets
-                .iter()
-                .for_each(|packet| stream.push(packet, &mut shared));
-        });
-    }
-
     fn take_packet(&mut self, datagram: &Datagram<'_>) {
-        let Some(key) = self.admit(datagram) else {
-            return;
-        };
-        let options = &self.options;
-        let stream = self.streams.entry(key);
-        let stream = stream.or_insert_with(|| Stream::new(options.probe(&key), datagram));
-        stream.push(datagram, &mut self.shared);
-    }
-
-    /// Counts a packet; gives its stream unless that one is not followed.
-    fn admit(&mut self, datagram: &Datagram<'_>) -> Option<StreamKey> {
         self.datagrams += 1;
         self.note_pause(datagram.time);
         let key = self.options.key(datagram);
         if self.streams.len() >= MAX_STREAMS && !self.streams.contains_key(&key) {
             self.unfollowed += 1;
-            return None;
+            return;
         }
-        Some(key)
+        let options = &self.options;
+        let stream = self.streams.entry(key);
+        let stream = stream.or_insert_with(|| Stream::new(options.probe(&key), datagram));
+        stream.push(datagram, &mut self.shared);
     }
 
     fn note_pause(&mut self, arrival: Timestamp) {

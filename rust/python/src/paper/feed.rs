@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use lidar_deflect_core::capture::DatagramBatch;
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::paper::frames::Frame;
 use lidar_deflect_core::paper::passthrough::PassThrough;
@@ -13,12 +12,10 @@ use lidar_deflect_core::time::Timestamp;
 use nalgebra::{Matrix4, Point3};
 use numpy::{PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
-use rayon::ThreadPool;
 
 use crate::arrays;
 use crate::capture::CaptureScan;
-use crate::capture::feed::Feed;
-use crate::compute::pool_of;
+use crate::capture::reading::ReadingFeed;
 use crate::error::BorderResult;
 
 /// Which frames to make of which capture.
@@ -87,16 +84,7 @@ impl FramePlan {
 }
 
 /// A capture on its way into frames.
-pub struct FrameFeed {
-    feed: Feed,
-    reader: FrameReader,
-    /// What is looked at, and what is read meanwhile.
-    batch: DatagramBatch,
-    ahead: DatagramBatch,
-    /// Begun with the first frames.
-    pool: Option<ThreadPool>,
-    has_ended: bool,
-}
+pub struct FrameFeed(ReadingFeed<FrameReader>);
 
 impl FrameFeed {
     /// Opens the files of a plan.
@@ -110,14 +98,8 @@ impl FrameFeed {
     }
 
     fn of(py: Python<'_>, plan: &FramePlan, frames: &reader::FramePlan) -> BorderResult<Self> {
-        Ok(Self {
-            feed: Feed::open(py, &plan.paths)?,
-            reader: FrameReader::new(&plan.report, frames)?,
-            batch: DatagramBatch::default(),
-            ahead: DatagramBatch::default(),
-            pool: None,
-            has_ended: false,
-        })
+        let reader = FrameReader::new(&plan.report, frames)?;
+        Ok(Self(ReadingFeed::open(py, &plan.paths, reader)?))
     }
 
     /// The next `count` frames, fewer at the end, none after it.
@@ -131,45 +113,14 @@ impl FrameFeed {
         let mut frames = Vec::with_capacity(count);
         loop {
             while frames.len() < count
-                && let Some(frame) = self.reader.pop()
+                && let Some(frame) = self.0.reading.pop()
             {
                 frames.push(frame);
             }
-            if frames.len() == count || self.has_ended {
+            if frames.len() == count || self.0.has_ended() {
                 return Ok(frames);
             }
-            self.read_on(py, threads, progress)?;
+            self.0.read_on(py, threads, progress)?;
         }
-    }
-
-    fn read_on(
-        &mut self,
-        py: Python<'_>,
-        threads: Option<usize>,
-        progress: Option<&Py<PyAny>>,
-    ) -> BorderResult<()> {
-        let Self {
-            feed,
-            reader,
-            batch,
-            ahead,
-            pool,
-            ..
-        } = self;
-        let own = match pool.take() {
-            Some(own) => own,
-            None => pool_of(threads)?,
-        };
-        let own = pool.insert(own);
-        feed.batch(py, own, progress, ahead, || reader.push(batch))?;
-        std::mem::swap(batch, ahead);
-        if self.reader.is_done() {
-            self.feed.stop();
-        }
-        if self.batch.is_empty() || self.reader.is_done() {
-            self.reader.finish();
-            self.has_ended = true;
-        }
-        Ok(())
     }
 }

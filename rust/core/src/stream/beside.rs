@@ -1,0 +1,97 @@
+//! Sweeps of several lidars in one reading, each lidar's packets on a thread of their own.
+
+use rayon::prelude::*;
+
+use super::{ScanReport, SweepOptions, SweepReader};
+use crate::capture::DatagramBatch;
+use crate::error::ReadError;
+use crate::sweep::Sweep;
+
+/// What becomes of one lidar's sweeps.
+pub trait Taker: Send {
+    /// Takes the next sweep, in order of time.
+    fn take(&mut self, sweep: &Sweep);
+}
+
+/// What batches of datagrams are read into.
+pub trait Reading: Send {
+    /// Takes the next datagrams.
+    fn push(&mut self, batch: &DatagramBatch);
+
+    /// Whether nothing that follows is of use.
+    fn is_done(&self) -> bool;
+
+    /// The capture has ended: what is not complete comes out.
+    fn finish(&mut self);
+}
+
+/// Lidars side by side, each with its taker; what they take does not depend on the number of threads.
+pub struct Beside<T> {
+    lanes: Vec<Lane<T>>,
+}
+
+struct Lane<T> {
+    reader: SweepReader,
+    taker: T,
+}
+
+impl<T: Taker> Beside<T> {
+    /// Prepares for the capture that `report` was made of: options and taker of each lidar.
+    ///
+    /// # Errors
+    /// [`ReadError`] where a lidar cannot be decoded.
+    pub fn new(
+        report: &ScanReport,
+        lidars: impl IntoIterator<Item = (SweepOptions, T)>,
+    ) -> Result<Self, ReadError> {
+        let lane = |(options, taker): (SweepOptions, T)| {
+            let reader = SweepReader::new(report, &options)?;
+            Ok(Lane { reader, taker })
+        };
+        let lanes = lidars.into_iter().map(lane);
+        Ok(Self {
+            lanes: lanes.collect::<Result<_, ReadError>>()?,
+        })
+    }
+
+    /// The takers, in the order in which they were given.
+    pub fn takers(&mut self) -> impl Iterator<Item = &mut T> {
+        self.lanes.iter_mut().map(|lane| &mut lane.taker)
+    }
+
+    /// The takers with all that they took.
+    pub fn into_takers(self) -> impl Iterator<Item = T> {
+        self.lanes.into_iter().map(|lane| lane.taker)
+    }
+}
+
+impl<T: Taker> Reading for Beside<T> {
+    fn push(&mut self, batch: &DatagramBatch) {
+        self.lanes.par_iter_mut().for_each(|lane| {
+            for datagram in batch.iter() {
+                lane.reader.push(&datagram);
+                lane.take();
+            }
+        });
+    }
+
+    fn is_done(&self) -> bool {
+        self.lanes.iter().all(|lane| lane.reader.is_done())
+    }
+
+    fn finish(&mut self) {
+        self.lanes.par_iter_mut().for_each(|lane| {
+            lane.reader.finish();
+            lane.take();
+        });
+    }
+}
+
+impl<T: Taker> Lane<T> {
+    fn take(&mut self) {
+        while let Some(sweep) = self.reader.pop() {
+            self.taker.take(&sweep);
+            self.reader.recycle(sweep.lidar, sweep.cloud);
+        }
+    }
+}
