@@ -26,7 +26,7 @@ pub struct ShapeTrust {
     pub twist_waves_rad: f64,
     /// Of the axis within the chord, chord lengths.
     pub axis_fraction: f64,
-    /// Of each way in which contours of blades differ (see [`forms`]), as a share of what is usual; none
+    /// Of each way in which contours of blades differ, as a share of what is usual; none
     /// where a drawing tells the contour.
     pub form: f64,
     /// Of each wave of the surface, metres.

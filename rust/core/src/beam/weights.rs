@@ -31,7 +31,7 @@ pub struct Weights {
 /// What became of the data of a hold.
 #[derive(Debug, Clone, Default)]
 pub struct Tally {
-    /// What all of them cost, see [`super::bill`].
+    /// What all of them cost.
     pub cost: f64,
     /// Echoes that counted.
     pub used: Vec<Used>,
