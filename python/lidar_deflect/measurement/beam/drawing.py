@@ -41,9 +41,10 @@ class Drawing:
     blade
         The blade of the compiled core.
     trust
-        Number of functions along the span, and prior deviations of stiffness, weight, prebend
-        (relative), stress-free curvature (rad/m), the root's rotation (rad) and the coupling of
-        both bendings (share of their stiffness).
+        Number of functions along the span, and prior deviations of stiffness (relative, at the
+        root; how many times as large at the tip), weight, prebend (relative), stress-free curvature
+        (rad/m), the root's rotation (rad) and the coupling of both bendings (share of their
+        stiffness).
     shape_trust
         Of chord and its waves (relative; at the tip the latter grow by a factor), setting angle and
         waves of twist (rad), axis (chord lengths), contour (share of what blades differ by) and
@@ -72,8 +73,8 @@ def drawing_of(inputs: Inputs) -> Drawing:
     return Drawing(native, TRUST, _drawn_shape(blade), "drawing")
 
 
-TRUST = (5, 0.05, 0.5, 0.05, 1.5e-5, 1e-3, COUPLING)
-GENERIC_TRUST = (10, 0.3, 0.7, 0.8, 3e-4, 2e-3, COUPLING)
+TRUST = (5, 0.05, 1.0, 0.5, 0.05, 1.5e-5, 1e-3, COUPLING)
+GENERIC_TRUST = (10, 0.2, 3.0, 0.7, 0.8, 3e-4, 2e-3, COUPLING)
 """More functions along the span: what is seen of the outer blade tells little of the inner."""
 AXIS_U = 0.03
 """Without a drawing the axis may not go farther from where it is said to be: twist moves it, and

@@ -10,6 +10,9 @@ use super::normal::Normal;
 use super::step::Step;
 use crate::error::BeamError;
 
+/// What the surface differs by from one that was learned, patch by patch, metres: near both edges, where no
+/// wave stands, and between knots residuals do not tell it.
+const UNKNOWN_M: f64 = 0.004;
 /// A step that does no good is held back more by this factor, at most so often ...
 const GROWS: (f64, usize) = (10.0, 8);
 /// ... and the next one less by this factor where it does.
@@ -46,6 +49,7 @@ impl Adjustment {
         let moved_m = self.moved_m(&from);
         if gates.is_fine() {
             self.weights.learn(&tallies);
+            self.weights.surface_m = self.weights.surface_m.max(UNKNOWN_M);
         }
         Ok(Step {
             largest,

@@ -70,6 +70,8 @@ pub struct Trust {
     pub span_modes: usize,
     /// Relative standard deviation of the stiffness as a whole; its waves along the span have 0.6 of it.
     pub stiffness: f64,
+    /// The same of the stiffness at the tip, over that.
+    pub stiffness_tip: f64,
     /// Relative standard deviation of the weight.
     pub weight: f64,
     /// Relative standard deviation of the prebend.
@@ -89,6 +91,7 @@ impl Default for Trust {
         Self {
             span_modes: 5,
             stiffness: 0.05,
+            stiffness_tip: 1.0,
             weight: 0.5,
             prebend: 0.05,
             free_rad_m: 1.5e-5,
@@ -196,7 +199,9 @@ pub fn add(physics: &mut Physics, mesh: &Mesh, kind: Kind, value: f64) {
             elements.for_each(|e| physics.soft[which][e] += value * wave(e, mode));
         }
         Kind::Soft { which, mode } => {
-            elements.for_each(|e| physics.soft[which][e] *= (value * wave(e, mode)).exp());
+            elements.for_each(|e| {
+                physics.soft[which][e] *= (value * mesh.doubt[e] * wave(e, mode)).exp();
+            });
         }
         Kind::Free { axis, mode } => {
             elements.for_each(|e| physics.free[e][axis] += value * wave(e, mode));
@@ -327,6 +332,18 @@ mod tests {
         }
         let axis = physics.solve(&mesh, &mesh.free).unwrap();
         (mesh, physics, axis)
+    }
+
+    #[test]
+    fn stiffness_may_be_known_less_towards_the_tip() {
+        let (mesh, physics, _) = bent();
+        let mesh = mesh.doubted(3.0);
+        let mut softer = physics.clone();
+        let flap = Kind::Soft { which: 1, mode: 0 };
+        add(&mut softer, &mesh, flap, 0.1);
+        let change = |e: usize| (softer.soft[1][e] / physics.soft[1][e]).ln();
+        assert!((change(0) - 0.1).abs() < 1e-6);
+        assert!((change(mesh.len() - 2) - 0.3).abs() < 0.02);
     }
 
     #[test]

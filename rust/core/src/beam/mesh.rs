@@ -30,6 +30,8 @@ pub struct Mesh {
     /// Compliance of each element by edgewise, flapwise and torsional stiffness and by a whole coupling
     /// of both bendings, 1/(N m^2).
     pub compliance: Vec<[Matrix3<f64>; 4]>,
+    /// How much less the stiffness of each element is known than that of the root.
+    pub doubt: Vec<f64>,
     /// A first guess of the mass per length of each element, kg/m.
     pub mass_kg_m: Vec<f64>,
     /// World directions of the root, stress-free.
@@ -63,11 +65,22 @@ impl Mesh {
             chord_m: s_m.iter().map(|s| design.chord_m(*s)).collect(),
             free: free.collect(),
             compliance: middles.iter().map(|s| compliance(design, *s)).collect(),
+            doubt: vec![1.0; middles.len()],
             mass_kg_m: middles.iter().map(|s| mass_kg_m(design, *s)).collect(),
             root: design.clamp * lean.matrix(),
             hand: design.hand,
             s_m,
         }
+    }
+
+    /// With stiffness known less and less towards the tip, where it is known by so much less.
+    #[must_use]
+    pub fn doubted(mut self, tip: f64) -> Self {
+        let length = self.length_m();
+        for (doubt, s_m) in self.doubt.iter_mut().zip(&self.s_m) {
+            *doubt = 1.0 + (tip - 1.0) * (s_m / length).powi(4);
+        }
+        self
     }
 
     /// Number of nodes.

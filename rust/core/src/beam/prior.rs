@@ -14,6 +14,9 @@ const VAGUE_RAD_M: f64 = 1e-4;
 const POSE: usize = 6;
 /// Inverse variance of what is held, against 1 of what is free.
 const HELD: f64 = 1e6;
+/// Standard deviation of the edges of a hold, lidar and side where no drawing tells how the nose turns away
+/// from a lidar, rad.
+const NOSE_RAD: f64 = 3e-4;
 /// Edges whose offset keeps less than this share of its weight are let go ...
 const LOOSE: f64 = 0.1;
 /// ... and worth a word beyond this, rad.
@@ -76,7 +79,8 @@ impl Adjustment {
             Some(common) => common.side_variance(lidar, side),
             None => 0.0,
         };
-        let spread = (1.0 + shared / (EDGE_OFFSET_RAD * EDGE_OFFSET_RAD)).sqrt();
+        let nose_rad = if self.is_vague() { NOSE_RAD } else { 0.0 };
+        let spread = ((nose_rad * nose_rad + shared).sqrt() / EDGE_OFFSET_RAD).hypot(1.0);
         let value = self.values[self.layout.edge_offset_at(hold, lidar, side)];
         let_go(value, spread) / (spread * spread)
     }

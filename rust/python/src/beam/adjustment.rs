@@ -73,7 +73,7 @@ impl BeamAdjustment {
         rig_prior: PyReadonlyArray1<'_, f64>,
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
-        trust: [f64; 7],
+        trust: [f64; 8],
         shape_trust: [f64; 10],
         noise_m: f64,
         surface_m: f64,
@@ -103,6 +103,7 @@ impl BeamAdjustment {
         let [
             span_modes,
             stiffness,
+            stiffness_tip,
             weight,
             prebend,
             free_rad_m,
@@ -134,11 +135,12 @@ impl BeamAdjustment {
             wave_knot_m,
         };
         let problem = Problem {
-            mesh: blade.mesh.clone(),
+            mesh: blade.mesh.clone().doubted(stiffness_tip),
             saddles: blade.saddles.clone(),
             trust: Trust {
                 span_modes: span_modes as usize,
                 stiffness,
+                stiffness_tip,
                 weight,
                 prebend,
                 free_rad_m,
