@@ -188,7 +188,9 @@ impl Shape {
             }
         };
         let (form_m, wave_m) = (self.form_m(mesh, node), self.waves_m(mesh, node));
-        add(&self.forms, 0, form_m, &forms(contact.x_c, is_second));
+        if self.forms.count > 0 {
+            add(&self.forms, 0, form_m, &forms(contact.x_c, is_second));
+        }
         let side = usize::from(is_second) * CHORD_WAVES;
         add(&self.waves, side, wave_m, &heights(contact.x_c));
     }

@@ -539,7 +539,7 @@ fn stage_named(name: &str) -> Result<Stage, InvalidValue> {
         "all" => Ok(Stage::All),
         _ => Err(InvalidValue {
             name: "stage",
-            expected: "loads, blade or all".into(),
+            expected: "loads, blade, surface or all".into(),
             found: name.into(),
         }),
     }
