@@ -6,19 +6,23 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+import polars as pl
 import pytest
+from polars.io.plugins import register_io_source
 
 from lidar_deflect import config
 from lidar_deflect.cli import failure, options, talk, units
 from lidar_deflect.cli.app import COMMANDS, app, run
 from lidar_deflect.cli.interrupt import Interrupt
 from lidar_deflect.errors import CaptureError, LidarDeflectError, OutputError
-from lidar_deflect.files import uninterrupted
+from lidar_deflect.files import keep_interrupts_from_polars
 
 HEAVY = {"numpy", "polars", "pydantic", "plotly", "tomlkit", "rich", "lidar_deflect._native"}
 EVERY_KEY = Path(__file__).parent / "data" / "config" / "every_key.toml"
@@ -270,15 +274,21 @@ def test_an_interrupt_that_python_only_printed_strikes_again(
 
 @pytest.mark.skipif(os.name == "nt", reason="signals differ on Windows")
 @pytest.mark.usefixtures("heard")
-def test_an_interrupt_waits_for_a_file_to_be_whole() -> None:
-    done = []
+def test_a_file_being_written_by_a_thread_outlives_an_interrupt(tmp_path: Path) -> None:
+    def frames(*_: Any) -> Iterator[pl.DataFrame]:
+        for _ in range(50):
+            time.sleep(0.01)
+            yield pl.DataFrame({"x_m": [1.0] * 1000})
 
-    def block() -> None:
-        with uninterrupted():
-            signal.raise_signal(signal.SIGINT)
-            done.append("block")
-        done.append("after")
+    def write() -> None:
+        source = register_io_source(frames, schema={"x_m": pl.Float64}, is_pure=True)
+        source.sink_parquet(tmp_path / "points.parquet")
 
+    keep_interrupts_from_polars()
+    writer = threading.Thread(target=write)
+    writer.start()
+    time.sleep(0.1)  # polars answers only inside of the call
     with pytest.raises(KeyboardInterrupt):
-        block()
-    assert done == ["block"]
+        signal.raise_signal(signal.SIGINT)
+    writer.join()
+    assert pl.read_parquet(tmp_path / "points.parquet").height == 50 * 1000

@@ -18,7 +18,7 @@ from lidar_deflect import _native
 from lidar_deflect import capture as captures
 from lidar_deflect.capture import RETURN_KINDS, Capture
 from lidar_deflect.errors import CaptureError, InvalidValueError
-from lidar_deflect.files import whole_file
+from lidar_deflect.files import keep_interrupts_from_polars, whole_file
 from lidar_deflect.lasfiles import LasFile, LazFile
 from lidar_deflect.pointfiles import PLAIN, Block, NpzFile, PcdFile, PlyFile, PointFile
 
@@ -215,6 +215,7 @@ class ParquetFile(_TableFile):
         self._blocks: queue.Queue[pl.DataFrame | None] = queue.Queue(maxsize=2)
         self._is_discarded = False
         self._failure: BaseException | None = None
+        keep_interrupts_from_polars()
         self._thread = threading.Thread(target=self._run, name="parquet", daemon=True)
         self._thread.start()
 

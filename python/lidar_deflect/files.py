@@ -66,23 +66,17 @@ def whole_folder(path: Path, *, overwrite: bool = False) -> Iterator[Path]:
             shutil.rmtree(temporary, ignore_errors=True)
 
 
-@contextmanager
-def uninterrupted() -> Iterator[None]:
-    """Let Ctrl-C wait until the block has ended; for blocks of milliseconds.
+def keep_interrupts_from_polars() -> None:
+    """Let Ctrl-C reach Python alone, which hears it as soon as a call into polars has returned.
 
-    polars answers an interrupt while it writes a file by a panic that it prints itself.
+    From its import on polars listens before Python does, and answers an interrupt while it writes
+    by panics that it prints itself. Python's handler, set once more, takes that place again.
     """
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, _: came.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
-        if came:
-            signal.raise_signal(signal.SIGINT)
+    import polars  # noqa: F401 - so that it does not come later
+
+    handler = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is threading.main_thread() and handler is not None:
+        signal.signal(signal.SIGINT, handler)
 
 
 def _swap(new: Path, path: Path) -> None:

@@ -13,7 +13,7 @@ import polars as pl
 
 from lidar_deflect import _native
 from lidar_deflect.errors import InvalidValueError
-from lidar_deflect.files import uninterrupted, whole_folder
+from lidar_deflect.files import keep_interrupts_from_polars, whole_folder
 from lidar_deflect.scene_plan import anchor, plan, start_ns
 from lidar_deflect.scene_survey import configuration, is_loaded, unit_name, wire_column
 
@@ -121,8 +121,8 @@ def _write_truth(
         "twist_deg": np.degrees(rows[:, 12]),
     }
     truth = pl.DataFrame(columns).sort("s_m", "time")
-    with uninterrupted():
-        truth.write_parquet(folder / "truth.parquet")
+    keep_interrupts_from_polars()
+    truth.write_parquet(folder / "truth.parquet")
     lidars = [
         {
             "source": lidar.address,

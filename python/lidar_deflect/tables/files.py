@@ -7,7 +7,7 @@ from pathlib import Path
 import polars as pl
 
 from lidar_deflect.errors import InvalidValueError, ResultError, ResultNotFoundError
-from lidar_deflect.files import uninterrupted, whole_file
+from lidar_deflect.files import keep_interrupts_from_polars, whole_file
 from lidar_deflect.tables.build import check
 from lidar_deflect.tables.catalogue import SCHEMA_VERSION, SCHEMAS
 
@@ -61,7 +61,8 @@ def write(
     if HASH_KEY not in metadata:
         raise InvalidValueError(f"metadata of table {name} lacks {HASH_KEY}", code="table.metadata")
     own = dict(zip(_OWN, (str(SCHEMA_VERSION), version("lidar-deflect"), name), strict=True))
-    with whole_file(path, overwrite=True) as temporary, uninterrupted():
+    keep_interrupts_from_polars()
+    with whole_file(path, overwrite=True) as temporary:
         try:
             frame.write_parquet(temporary, metadata={**metadata, **own})
         except pl.exceptions.PolarsError as error:
