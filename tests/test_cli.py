@@ -6,23 +6,19 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 import weakref
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import polars as pl
 import pytest
-from polars.io.plugins import register_io_source
 
 from lidar_deflect import config
 from lidar_deflect.cli import failure, options, talk, units
 from lidar_deflect.cli.app import COMMANDS, app, run
 from lidar_deflect.cli.interrupt import Interrupt
 from lidar_deflect.errors import CaptureError, LidarDeflectError, OutputError
-from lidar_deflect.files import keep_interrupts_from_polars
 
 HEAVY = {"numpy", "polars", "pydantic", "plotly", "tomlkit", "rich", "lidar_deflect._native"}
 EVERY_KEY = Path(__file__).parent / "data" / "config" / "every_key.toml"
@@ -272,23 +268,38 @@ def test_an_interrupt_that_python_only_printed_strikes_again(
     assert capsys.readouterr() == ("", "")
 
 
+# In an interpreter of its own: pytest and the fixtures above set handlers after polars did.
+WRITTEN_BESIDE = """
+import signal, sys, threading, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
+import polars as pl
+from polars.io.plugins import register_io_source
+from lidar_deflect.files import keep_interrupts_from_polars
+
+def frames(*_):
+    for _ in range(50):
+        time.sleep(0.01)
+        yield pl.DataFrame({"x_m": [1.0] * 1000})
+
+def write():
+    register_io_source(frames, schema={"x_m": pl.Float64}, is_pure=True).sink_parquet(sys.argv[1])
+
+keep_interrupts_from_polars()
+writer = threading.Thread(target=write)
+writer.start()
+time.sleep(0.1)
+try:
+    signal.raise_signal(signal.SIGINT)
+except KeyboardInterrupt:
+    print("heard")
+writer.join()
+"""
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals differ on Windows")
-@pytest.mark.usefixtures("heard")
 def test_a_file_being_written_by_a_thread_outlives_an_interrupt(tmp_path: Path) -> None:
-    def frames(*_: Any) -> Iterator[pl.DataFrame]:
-        for _ in range(50):
-            time.sleep(0.01)
-            yield pl.DataFrame({"x_m": [1.0] * 1000})
-
-    def write() -> None:
-        source = register_io_source(frames, schema={"x_m": pl.Float64}, is_pure=True)
-        source.sink_parquet(tmp_path / "points.parquet")
-
-    keep_interrupts_from_polars()
-    writer = threading.Thread(target=write)
-    writer.start()
-    time.sleep(0.1)  # polars answers only inside of the call
-    with pytest.raises(KeyboardInterrupt):
-        signal.raise_signal(signal.SIGINT)
-    writer.join()
-    assert pl.read_parquet(tmp_path / "points.parquet").height == 50 * 1000
+    path = tmp_path / "points.parquet"
+    command = [sys.executable, "-c", WRITTEN_BESIDE, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("heard\n", "")
+    assert pl.read_parquet(path).height == 50 * 1000
