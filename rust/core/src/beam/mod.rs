@@ -39,6 +39,7 @@ pub mod seek;
 pub mod shape;
 pub mod sight;
 pub mod silhouette;
+mod smooth;
 pub mod solution;
 pub mod start;
 pub mod step;

@@ -113,6 +113,9 @@ impl Adjustment {
             prior.right[place] = tight * (self.expected[i] - self.values[i]);
         }
         self.tie_clocks(&mut prior);
+        if self.follows_load {
+            self.smooth(&mut prior);
+        }
         if self.free.contains(&rig) {
             let at = rig - self.free.start;
             let information = self.rig_information(stage);

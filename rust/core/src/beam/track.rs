@@ -18,7 +18,7 @@ use super::weights::Tally;
 use crate::error::BeamError;
 
 /// Time between two knots, nanoseconds.
-const KNOT_NS: i64 = 100_000_000;
+const KNOT_NS: i64 = 50_000_000;
 /// Standard deviation of the load against its channel, share of full load.
 const LOAD_SHARE: f64 = 0.02;
 /// At most so many echoes of a stretch are used: what the holds told of lidars and surface leaves more unsure
