@@ -82,13 +82,13 @@ errors of the contour would pass for that."""
 
 
 def _drawn_shape(blade: Blade) -> tuple[float, ...]:
-    return (0.004, 0.001, 1.0, np.radians(blade.setting_u_deg), 0.0005, 0.002, 0.0, 0.002, 9.0, 1.0)
+    return (0.004, 0.001, 1.0, np.radians(blade.setting_u_deg), 0.0005, 0.002, 0.0, 0.002, 9.0, 1.0, 0.0)
 
 
 def _generic_shape(blade: Blade) -> tuple[float, ...]:
     setting_rad = max(np.radians(blade.setting_u_deg), 0.03)
     axis = min(blade.axis_fraction_u, AXIS_U)
-    return (0.2, 0.1, 3.0, setting_rad, 0.01, axis, 0.7, 0.006, 0.8, 2.0)
+    return (0.2, 0.2, 3.0, setting_rad, 0.03, axis, 0.7, 0.006, 0.8, 2.0, 0.02)
 
 
 def _native_of(

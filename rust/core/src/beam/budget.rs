@@ -113,10 +113,12 @@ impl Adjustment {
         solved
     }
 
-    /// Standard deviations of all unknowns before the data: only clocks and lidars are known together.
+    /// Standard deviations of all unknowns before the data: clocks, lidars and the slow ones of the surface are
+    /// known together.
     fn deviations_before(&self, stage: Stage) -> Result<Vec<f64>, BeamError> {
         let prior = self.prior(stage).matrix;
-        let (first, end) = (self.layout.clock_at(0), self.layout.shape_at());
+        let slow = self.problem.shape.waves_from();
+        let (first, end) = (self.layout.clock_at(0), self.layout.shape_at() + slow);
         let block = prior.view((first, first), (end - first, end - first));
         let together = Factor::new(block.into_owned()).ok_or(BeamError::Singular)?;
         let covariance = together.inverse();

@@ -113,9 +113,7 @@ impl Adjustment {
             prior.right[place] = tight * (self.expected[i] - self.values[i]);
         }
         self.tie_clocks(&mut prior);
-        if self.follows_load {
-            self.smooth(&mut prior);
-        }
+        self.smooth(&mut prior);
         if self.free.contains(&rig) {
             let at = rig - self.free.start;
             let information = self.rig_information(stage);
@@ -133,7 +131,8 @@ impl Adjustment {
     pub(super) fn surprise(&self, stage: Stage) -> f64 {
         let of = |i: usize| self.tightness_of(i) * (self.expected[i] - self.values[i]).powi(2);
         let rig = self.layout.lidar_at(0)..self.layout.shape_at();
-        let own: f64 = self.free.clone().filter(|i| !rig.contains(i)).map(of).sum();
+        let apart: f64 = self.free.clone().filter(|i| !rig.contains(i)).map(of).sum();
+        let own = apart + self.roughness();
         if !self.free.contains(&rig.start) {
             return own;
         }

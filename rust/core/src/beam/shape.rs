@@ -1,5 +1,6 @@
 //! The surface as built: chord, setting angle and waves against the drawing.
 
+mod bends;
 mod built;
 mod forms;
 
@@ -24,6 +25,9 @@ pub struct ShapeTrust {
     pub setting_rad: f64,
     /// Of the twist as it varies along the span, rad.
     pub twist_waves_rad: f64,
+    /// How much less smoothly both vary: second difference of their knots over the two above; none where a
+    /// drawing tells them.
+    pub bend: f64,
     /// Of the axis within the chord, chord lengths.
     pub axis_fraction: f64,
     /// Of each way in which contours of blades differ, as a share of what is usual; none
@@ -47,6 +51,7 @@ impl Default for ShapeTrust {
             tip: 1.0,
             setting_rad: 0.3f64.to_radians(),
             twist_waves_rad: 0.0005,
+            bend: 0.0,
             axis_fraction: 0.002,
             form: 0.0,
             waves_m: 0.002,

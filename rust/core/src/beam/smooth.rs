@@ -1,5 +1,6 @@
-//! Between holds a blade moves smoothly: its knots lie as close as winches that start and stop need, and closer
-//! than its echoes could tell each of them.
+//! What neighbouring unknowns have in common before the data: between holds a blade moves smoothly, its knots lie as close
+//! as winches that start and stop need, and closer than its echoes could tell each of them; chord and twist vary
+//! smoothly where no drawing tells them.
 
 use super::adjust::Adjustment;
 use super::normal::Normal;
@@ -11,28 +12,75 @@ const FOURTH: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 /// of a sway, and what a swing of 2 m at 1.2 Hz has.
 const ROUGH: [f64; 5] = [0.004, 0.03, 0.03, 0.016, 0.016];
 
+/// A weighted sum of unknowns in a row that is known to be small.
+struct Small {
+    first: usize,
+    weights: Vec<f64>,
+    sigma: f64,
+}
+
 impl Adjustment {
-    /// Adds to what is known of a stretch before the data that fourth differences of its knots are small.
+    /// Adds to what is known before the data that neighbours differ little.
     pub(super) fn smooth(&self, prior: &mut Normal) {
-        let (knots, sway) = (self.layout.knots[0], self.layout.sway_at(0));
-        for (mode, rough) in ROUGH.iter().enumerate() {
-            let (first, sigma) = (sway + mode * knots, rough / self.modes_m[mode]);
-            for knot in first..=first + knots - FOURTH.len() {
-                self.smooth_at(prior, knot, 1.0 / (sigma * sigma));
+        for small in self
+            .small()
+            .filter(|small| prior.free.contains(&small.first))
+        {
+            let (at, weight) = (small.first - prior.free.start, small.sigma.powi(-2));
+            let sum = self.sum(&small);
+            for (i, one) in small.weights.iter().enumerate() {
+                prior.right[at + i] -= weight * one * sum;
+                for (j, other) in small.weights.iter().enumerate().take(i + 1) {
+                    prior.matrix[(at + i, at + j)] += weight * one * other;
+                }
             }
         }
     }
 
-    fn smooth_at(&self, prior: &mut Normal, knot: usize, weight: f64) {
-        let at = knot - prior.free.start;
-        let values = self.values.rows(knot, FOURTH.len());
-        let difference: f64 = FOURTH.iter().zip(&values).map(|(c, value)| c * value).sum();
-        for (i, one) in FOURTH.iter().enumerate() {
-            prior.right[at + i] -= weight * one * difference;
-            for (j, other) in FOURTH.iter().enumerate().take(i + 1) {
-                prior.matrix[(at + i, at + j)] += weight * one * other;
-            }
-        }
+    /// How far neighbours differ, as a weighted sum of squares.
+    pub(super) fn roughness(&self) -> f64 {
+        let free = self
+            .small()
+            .filter(|small| self.free.contains(&small.first));
+        free.map(|small| (self.sum(&small) / small.sigma).powi(2))
+            .sum()
+    }
+
+    fn small(&self) -> impl Iterator<Item = Small> {
+        self.surface().chain(self.motion())
+    }
+
+    /// Bends of chord and twist.
+    fn surface(&self) -> impl Iterator<Item = Small> {
+        let first = self.layout.shape_at();
+        self.problem.shape.bends().map(move |bend| Small {
+            first: first + bend.first,
+            weights: bend.weights.to_vec(),
+            sigma: bend.sigma,
+        })
+    }
+
+    /// Fourth differences of the knots of a stretch.
+    fn motion(&self) -> impl Iterator<Item = Small> {
+        let (knots, sway) = (self.layout.knots[0], self.layout.sway_at(0));
+        let modes = if self.follows_load { ROUGH.len() } else { 0 };
+        (0..modes).flat_map(move |mode| {
+            (0..=knots - FOURTH.len()).map(move |knot| Small {
+                first: sway + mode * knots + knot,
+                weights: FOURTH.to_vec(),
+                sigma: ROUGH[mode] / self.modes_m[mode],
+            })
+        })
+    }
+
+    fn sum(&self, small: &Small) -> f64 {
+        let values = self.values.rows(small.first, small.weights.len());
+        small
+            .weights
+            .iter()
+            .zip(&values)
+            .map(|(w, value)| w * value)
+            .sum()
     }
 }
 

@@ -74,7 +74,7 @@ impl BeamAdjustment {
         rig_covariance: PyReadonlyArray2<'_, f64>,
         from_m: f64,
         trust: [f64; 8],
-        shape_trust: [f64; 10],
+        shape_trust: [f64; 11],
         noise_m: f64,
         surface_m: f64,
         edge_rad: f64,
@@ -121,6 +121,7 @@ impl BeamAdjustment {
             waves_m,
             slow_knot_m,
             wave_knot_m,
+            bend,
         ] = shape_trust;
         let shape = ShapeTrust {
             chord,
@@ -133,6 +134,7 @@ impl BeamAdjustment {
             waves_m,
             slow_knot_m,
             wave_knot_m,
+            bend,
         };
         let problem = Problem {
             mesh: blade.mesh.clone().doubted(stiffness_tip),

@@ -1,0 +1,49 @@
+//! Chord and twist of a blade without a drawing vary smoothly, but towards the tip.
+
+use super::Shape;
+
+/// A blade ends like an ellipse: the logarithm of its chord bends by this over the square of the distance left.
+const ELLIPSE: f64 = 0.5;
+
+/// A sum of neighbouring unknowns that is small.
+#[derive(Debug, Clone, Copy)]
+pub struct Bend {
+    /// The first of them.
+    pub first: usize,
+    /// Their weights.
+    pub weights: [f64; 3],
+    /// Standard deviation of the sum.
+    pub sigma: f64,
+}
+
+impl Shape {
+    /// Second differences of the knots of chord and twist.
+    pub fn bends(&self) -> impl Iterator<Item = Bend> {
+        let inner = match self.trust.bend > 0.0 {
+            true => 0..self.slow.saturating_sub(2),
+            false => 0..0,
+        };
+        inner.flat_map(|knot| [self.chord_bend(knot), self.twist_bend(knot)])
+    }
+
+    fn chord_bend(&self, knot: usize) -> Bend {
+        let left = (self.slow - 2 - knot) as f64;
+        let share = |k: usize| self.chord_wave(knot + k) / self.trust.chord_waves;
+        Bend {
+            first: 3 + knot,
+            weights: [share(0), -2.0 * share(1), share(2)],
+            sigma: self
+                .trust
+                .bend
+                .hypot(ELLIPSE / (left * left) / self.trust.chord_waves),
+        }
+    }
+
+    fn twist_bend(&self, knot: usize) -> Bend {
+        Bend {
+            first: 3 + self.slow + knot,
+            weights: [1.0, -2.0, 1.0],
+            sigma: self.trust.bend,
+        }
+    }
+}
