@@ -25,6 +25,7 @@ __all__ = [
     "StaticHold",
     "Sweep",
     "SweepIterator",
+    "WatchedPass",
     "__version__",
     "adjust_network",
     "arc_length",
@@ -41,13 +42,18 @@ __all__ = [
     "fit_plane",
     "fit_polynomial",
     "hold_echoes",
+    "huber_weighted",
     "line_clusters",
     "line_extremes",
+    "median_size",
     "pass_through",
+    "points_near_box",
+    "points_nearest_to",
     "polynomial_powers",
     "polynomial_slopes",
     "polynomial_values",
     "polynomial_variances",
+    "pose_design",
     "radii_at",
     "radii_of",
     "reference_blades",
@@ -111,18 +117,19 @@ def hold_echoes(
     lidars: Sequence[int],
     start_ns: int,
     stop_ns: int,
+    with_intensity: bool = True,
     threads: int | None = None,
 ) -> list[
     tuple[NDArray[np.float32], NDArray[np.uint16], NDArray[np.float32], NDArray[np.float32]]
 ]: ...
 def echo_cells(
     ring: NDArray[np.uint16], azimuth_deg: NDArray[np.float32], grid: tuple[float, int, int]
-) -> NDArray[np.int64]: ...
+) -> NDArray[np.uint32]: ...
 def cell_positions(
-    cells: NDArray[np.int64], xyz: NDArray[np.float32], size: int
+    cells: NDArray[np.uint32], xyz: NDArray[np.float32], size: int
 ) -> tuple[NDArray[np.int64], NDArray[np.float64]]: ...
 def cell_heights(
-    cells: NDArray[np.int64],
+    cells: NDArray[np.uint32],
     xyz: NDArray[np.float32],
     plane: NDArray[np.int64],
     height_m: NDArray[np.float64],
@@ -149,7 +156,15 @@ class CellPass:
         self,
         threads: int | None = None,
         progress: Callable[[int, int], None] | None = None,
-    ) -> list[tuple[int, NDArray[np.int64], NDArray[np.float32], int, int]] | None: ...
+    ) -> list[tuple[int, NDArray[np.uint32], NDArray[np.float32], int, int]] | None: ...
+
+def pose_design(
+    ray_m: NDArray[np.float64], normal: NDArray[np.float64], sigma_m: NDArray[np.float64]
+) -> NDArray[np.float64]: ...
+def median_size(values: NDArray[np.float64]) -> float: ...
+def huber_weighted(
+    design: NDArray[np.float64], left: NDArray[np.float64], limit: float, square: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
 
 @final
 class PointIterator(Iterator[dict[str, NDArray[Any]]]):
@@ -267,6 +282,12 @@ def yaw_from_wall(
     yaw_range_rad: float,
     min_height_m: float,
 ) -> tuple[float, float, int]: ...
+def points_near_box(
+    xyz: NDArray[np.float32], pose: NDArray[np.float64], box_m: NDArray[np.float64]
+) -> NDArray[np.float32]: ...
+def points_nearest_to(
+    xyz: NDArray[np.float32], direction: NDArray[np.float64]
+) -> NDArray[np.int64]: ...
 
 @final
 class FramePlan:
@@ -318,6 +339,25 @@ class DistancePass:
         progress: Callable[[int, int], None] | None = None,
     ) -> bool: ...
     def ranges_m(self) -> NDArray[np.float64]: ...
+
+@final
+class WatchedPass:
+    def __new__(
+        cls,
+        plan: FramePlan,
+        *,
+        lidars: Sequence[int],
+        every: Sequence[int],
+        watched: Sequence[NDArray[np.bool_]],
+        grid: tuple[float, int, int],
+        window_ns: int,
+    ) -> WatchedPass: ...
+    def advance(
+        self,
+        threads: int | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> list[tuple[int, NDArray[np.uint32], NDArray[np.float32], int, int]] | None: ...
+    def survey(self) -> DistancePass | None: ...
 
 @final
 class ContourPass:

@@ -1,6 +1,6 @@
 """What other instruments and calculations say: load, draw wires, root rotation, prediction."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -18,6 +18,7 @@ PERCENT = {"percent": 1.0, "%": 1.0, "fraction": 100.0}
 FORCE = ("N", "kN", "MN", "Nm", "kNm", "MNm", "t", "bar", "V")
 
 Floats = npt.NDArray[np.float64]
+Times = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,7 @@ def read_wire(
     unit: str = "mm",
     negate: bool = False,
     near_ns: int | None = None,
+    instants: Callable[[pl.DataFrame, str, str | Path, int | None], Times] = delimited.instants,
 ) -> Channel:
     """Read a draw wire in metres, positive where the distance to its anchor became shorter.
 
@@ -128,11 +130,13 @@ def read_wire(
         True where the reading grows with the distance.
     near_ns
         Start of the test: dates times of day.
+    instants
+        What reads the column of instants.
     """
     frame = delimited.read(path, [column, time])
     factor = _factor(unit, METRES, f"wire {name}") * (-1.0 if negate else 1.0)
     values = delimited.numbers(frame, column, path) * factor
-    return Channel(name, delimited.instants(frame, time, path, near_ns), values, "m")
+    return Channel(name, instants(frame, time, path, near_ns), values, "m")
 
 
 def read_root(

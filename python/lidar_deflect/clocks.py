@@ -157,18 +157,31 @@ class _Pair:
         last = np.searchsorted(at, self.channel_t[-1], side="right")
         if last - first < max(_FEWEST, _SHARE * self.t.size):
             return None
-        d = self.d[first:last]
-        if d.max() - d.min() < 0.3 * self._reach:
+        terms = self._terms(int(first), int(last))
+        if terms is None:
             return None
         y = np.interp(at[first:last], self.channel_t, self.channel)
         spread = float(np.var(y))
         if spread <= 0.2 * self._spread:
             return None
-        terms = np.column_stack([np.ones_like(d), d, d * d])
         solution = np.linalg.lstsq(terms, y, rcond=None)[0]
         off: Floats = y - terms @ solution
         square = float(np.mean(off**2))
         return square, square / spread, off
+
+    def _terms(self, first: int, last: int) -> Floats | None:
+        """Return a parabola's terms at these states, shape (n, 3); None where too little moves."""
+        known = self._last_terms
+        if (first, last) not in known:  # neighbouring shifts have the same states
+            known.clear()
+            d = self.d[first:last]
+            moves = not d.max() - d.min() < 0.3 * self._reach
+            known[first, last] = np.column_stack([np.ones_like(d), d, d * d]) if moves else None
+        return known[first, last]
+
+    @cached_property
+    def _last_terms(self) -> dict[tuple[int, int], Floats | None]:
+        return {}
 
     def best(self, low_s: float, high_s: float, step_s: float) -> tuple[float, float] | None:
         """Return the shift that leaves least, and what it leaves, on a grid."""

@@ -13,6 +13,8 @@ from lidar_deflect.errors import ConfigError
 from lidar_deflect.laboratory import clock
 from lidar_deflect.tables import nearest_hint
 
+Times = npt.NDArray[np.int64]
+
 _MISSING = ("", "nan", "null", "none", "n/a", "na", "-")
 _DECIMAL_COMMA = r"^\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*$"
 _UTC_SECONDS = (1e8, 1e11)  # 1973 to 5138: neither seconds since a start nor milliseconds
@@ -126,6 +128,22 @@ def instants(
             f"column {name!r} of {path} does not rise at data row {row}", code="config.channel"
         )
     return found
+
+
+class Instants:
+    """Reads as `instants` does, and a column that it read last only once: wires share a file."""
+
+    def __init__(self) -> None:
+        self._last: tuple[pl.Series, tuple[str, str, int | None], Times] | None = None
+
+    def __call__(
+        self, frame: pl.DataFrame, name: str, path: str | Path, near_ns: int | None = None
+    ) -> Times:
+        """Read a column of instants."""
+        series, asked = column(frame, name, path), (name, str(path), near_ns)
+        if self._last is None or self._last[1] != asked or not series.equals(self._last[0]):
+            self._last = series, asked, instants(frame, name, path, near_ns)
+        return self._last[2]
 
 
 def _instants(series: pl.Series, name: str, path: str | Path) -> pl.Series:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lidar_deflect import channels
+from lidar_deflect import channels, delimited
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -43,6 +43,7 @@ def wires(
     config: Config, near_ns: int | None = None, shifts: Shifts = NO_SHIFTS
 ) -> tuple[Channel, ...]:
     """Read the real draw wires, metres; virtual ones have no file and are left out."""
+    instants = delimited.Instants()
     return tuple(
         channels.read_wire(
             wire.file,
@@ -52,6 +53,7 @@ def wires(
             unit=wire.unit,
             negate=wire.negate,
             near_ns=near_ns,
+            instants=instants,
         ).shifted(_shift(wire.shift_s, wire.file, shifts))
         for wire in config.wires
         if wire.file is not None and wire.column is not None

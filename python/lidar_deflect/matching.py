@@ -93,18 +93,18 @@ def _outermost(states: States) -> tuple[Times, Floats]:
 
 def _of(opened: OpenedTest, file: Path) -> list[Channel]:
     """Every channel of a file, as it is written."""
-    config, near = opened.config, opened.capture.first_time_ns
+    config = opened.config
     found: list[Channel] = []
     if config.load.file == file and opened.load is not None:
         found.append(opened.load)
     named = {wire.name for wire in config.wires if wire.file == file}
     if named:
-        found += [each for each in instruments.wires(config, near) if each.name in named]
+        found += [each for each in opened.wires if each.name in named]
     if config.root is not None and config.root.file == file:
-        found += instruments.root(config, near)
+        found += opened.root
     other = {each.name for each in config.channels if each.file == file}
     if other:
-        found += [each for each in instruments.others(config, near) if each.name in other]
+        found += [each for each in opened.others if each.name in other]
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,6 +65,18 @@ class OpenedTest:
         """Open captures, see which lidars are in them, and read the load channel."""
         files = tuple(Path(path) for path in paths)
         capture = captures.open(files, config=config)
+        return cls.of_capture(config, capture, progress=progress, threads=threads)
+
+    @classmethod
+    def of_capture(
+        cls,
+        config: Config,
+        capture: Capture,
+        *,
+        progress: Progress | None,
+        threads: int | None,
+    ) -> OpenedTest:
+        """See which lidars are in a capture that was opened, and read the load channel."""
         capture.scan(stage_listener(progress, "scan"))
         if not capture.lidars:
             raise CaptureError(
@@ -95,6 +108,21 @@ class OpenedTest:
         holds = None if load is None else hold_finder.from_load(load.time_ns, load.value)
         return replace(self, load=load, holds=holds, shifts=shifts)
 
+    @cached_property
+    def wires(self) -> tuple[Channel, ...]:
+        """The real draw wires by their clocks as known, read once."""
+        return instruments.wires(self.config, self.capture.first_time_ns, self.shifts)
+
+    @cached_property
+    def root(self) -> tuple[Channel, ...]:
+        """The measured rotations of the root, likewise."""
+        return instruments.root(self.config, self.capture.first_time_ns, self.shifts)
+
+    @cached_property
+    def others(self) -> tuple[Channel, ...]:
+        """The other instruments, likewise."""
+        return instruments.others(self.config, self.capture.first_time_ns, self.shifts)
+
     def limits_ns(self, start_s: float | None, stop_s: float | None) -> tuple[int, int]:
         """Return limits in seconds since the first lidar packet as instants."""
         first, last = self.capture.first_time_ns, self.capture.last_time_ns
@@ -115,9 +143,21 @@ class OpenedTest:
             return self.limits_ns(start_s, stop_s)
         return unloaded.window_ns(self.config, self.capture, self.holds)
 
-    def hold(self, window_ns: tuple[int, int]) -> Mapping[str, HoldCloud]:
-        """Gather what every lidar sees in a hold."""
-        return unloaded.collect_all(self.capture, self.lidars, window_ns, self.threads)
+    def hold(
+        self,
+        window_ns: tuple[int, int],
+        lidars: Sequence[str] | None = None,
+        *,
+        with_intensity: bool = True,
+    ) -> Mapping[str, HoldCloud]:
+        """Gather what every lidar sees in a hold, or some of them."""
+        return unloaded.collect_all(
+            self.capture,
+            self.lidars if lidars is None else lidars,
+            window_ns,
+            self.threads,
+            with_intensity=with_intensity,
+        )
 
     def unloaded_or_kept_ns(self, known: Calibration | None) -> tuple[int, int] | None:
         """Return the unloaded hold of these captures, None where the calibration's state serves."""

@@ -27,12 +27,14 @@ from lidar_deflect import config as configs
 from lidar_deflect import holds as hold_finder
 from lidar_deflect import wires as wire_lines
 from lidar_deflect.calibrate import calibrate
-from lidar_deflect.calibration import Calibration, with_reference
+from lidar_deflect.calibration import Calibration
 from lidar_deflect.checks import check
 from lidar_deflect.errors import ConfigError
-from lidar_deflect.measurement import METHODS, beam, paper, tabulate
+from lidar_deflect.measurement import METHODS, tabulate
+from lidar_deflect.measurement.contours import frame_plan
 from lidar_deflect.measurement.health import health_table
 from lidar_deflect.opened import OpenedTest
+from lidar_deflect.rest import Rest, with_unloaded_state
 from lidar_deflect.result import Result
 
 if TYPE_CHECKING:
@@ -47,7 +49,6 @@ if TYPE_CHECKING:
     from lidar_deflect.matching import Match
     from lidar_deflect.measurement import Inputs, States
     from lidar_deflect.measurement.inputs import Progress
-    from lidar_deflect.measurement.unloaded import HoldCloud
 
 DETAILS = ("contour", "points", "rejected")
 """Tables whose columns a method gives itself."""
@@ -155,11 +156,12 @@ class Test:
                 hint="add [[sections]] with name and s_m",
             )
         watch = provenance.Stopwatch()
-        opened = OpenedTest.of(self.config, paths, progress=progress, threads=threads)
-        limits = opened.limits_ns(start_s, stop_s)
-        watch.lap("scan")
+        capture = captures.open([*paths], config=self.config)
         name = method or self.config.measure.method
-        with provenance.FileFacts(opened.paths) as files:
+        with provenance.FileFacts(capture.paths) as files:
+            opened = OpenedTest.of_capture(self.config, capture, progress=progress, threads=threads)
+            limits = opened.limits_ns(start_s, stop_s)
+            watch.lap("scan")
             inputs, states, drifted = self._states(
                 opened, calibration, name, limits, rate_hz, watch
             )
@@ -185,16 +187,12 @@ class Test:
     ) -> tuple[Inputs, States, Drift]:
         """Calibrate where that is still to be done, watch the tripods, measure by one method."""
         known = self._known(calibration, opened, opened.progress, opened.threads)
-        window = opened.unloaded_or_kept_ns(known)
-        clouds = opened.hold(window) if window else {}
-        known = known or calibrate(self.config, clouds)
-        if window and not limits[0] <= window[0] < window[1] <= limits[1]:
-            known = with_unloaded_state(opened, known, clouds, window)
-            clouds, window = {}, None
+        rest = Rest.of(opened, known, name, limits, rate_hz)
         watch.lap("calibrate")
-        inputs = opened.inputs(known, clouds, window, limits=limits, rate_hz=rate_hz)
-        drifted = drift.watch(inputs)
-        inputs = replace(inputs, moves=drifted.moves)
+        inputs = rest.inputs
+        frames = frame_plan(inputs, inputs.plan) if name == "paper" and inputs.plan else None
+        drifted = drift.watch(inputs, rest.cells, frames)
+        inputs = replace(inputs, moves=drifted.moves, survey=drifted.survey)
         watch.lap("drift")
         states = drift.marked(_method(name)(inputs), drifted)
         watch.lap("measure")
@@ -218,21 +216,6 @@ class Test:
         return self.calibrate(self.config.reference.capture, progress=progress, threads=threads)
 
 
-def with_unloaded_state(
-    opened: OpenedTest,
-    calibration: Calibration,
-    clouds: Mapping[str, HoldCloud],
-    window_ns: tuple[int, int],
-) -> Calibration:
-    """Return the calibration with the state of the unloaded blade, so that it serves other runs."""
-    inputs = opened.inputs(calibration, clouds, window_ns, limits=window_ns)
-    known = with_reference(calibration, "paper", paper.calibrated_reference(inputs))
-    if opened.config.measure.method != "beam":
-        return known
-    inputs = opened.inputs(known, clouds, window_ns, limits=window_ns)
-    return with_reference(known, "beam", beam.calibrated_reference(inputs))
-
-
 def result_of(
     opened: OpenedTest,
     inputs: Inputs,
@@ -246,13 +229,11 @@ def result_of(
     """Tables and provenance of what a method found."""
     first_ns = opened.capture.first_time_ns
     holds = _measured_holds(opened, inputs, states)
-    root = instruments.root(opened.config, first_ns, opened.shifts)
-    wires = instruments.wires(opened.config, first_ns, opened.shifts)
+    wires, root = opened.wires, opened.root
     deflection = tabulate.deflection(states, holds, load=opened.load, root=root, first_ns=first_ns)
     health = health_table(opened.capture, inputs.lidars, states)
     settings = opened.config.model_dump()
-    others = instruments.others(opened.config, first_ns, opened.shifts)
-    given = [*([opened.load] if opened.load else []), *wires, *root, *others]
+    given = [*([opened.load] if opened.load else []), *wires, *root, *opened.others]
     given += wire_lines.predicted(deflection, settings)
     averages = steps.average(deflection, holds)
     frames = {

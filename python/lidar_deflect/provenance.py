@@ -170,6 +170,7 @@ def _too_uncertain(config: Config, states: States) -> list[str]:
 
 
 def _lost_percent(health: pl.DataFrame) -> dict[str, float]:
-    sums = health.group_by("lidar", maintain_order=True).sum()
+    counts = health.select("lidar", "lost", "packets")  # instants have no sum
+    sums = counts.group_by("lidar", maintain_order=True).sum()
     sent = zip(sums["lidar"], sums["lost"], sums["packets"], strict=True)
     return {id: 100.0 * lost / max(1, lost + packets) for id, lost, packets in sent}

@@ -3,6 +3,6 @@
 from lidar_deflect.drift.change import Change, estimate
 from lidar_deflect.drift.marked import marked
 from lidar_deflect.drift.move import Move
-from lidar_deflect.drift.watch import Drift, watch
+from lidar_deflect.drift.watch import Drift, static_cells, watch
 
-__all__ = ["Change", "Drift", "Move", "estimate", "marked", "watch"]
+__all__ = ["Change", "Drift", "Move", "estimate", "marked", "static_cells", "watch"]

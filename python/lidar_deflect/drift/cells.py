@@ -114,17 +114,17 @@ class Cells:
         limit = ROUGH * float(np.median(known)) if len(known) else 0.0
         return replace(self, plane=np.where(self.sigma_m > limit, -1, self.plane))
 
-    @property
+    @cached_property
     def seen(self) -> int:
         """How many cells can be watched."""
         return int((self.plane >= 0).sum())
 
-    def watches(self, key: NDArray[np.intp]) -> NDArray[np.bool_]:
+    def watches(self, key: NDArray[np.uint32]) -> NDArray[np.bool_]:
         """Tell which cells are watched, by their numbers, shape (n,)."""
         inside = key < len(self.plane)
         return np.asarray(inside & (self.plane[np.where(inside, key, 0)] >= 0))
 
-    def away_m(self, cell: NDArray[np.intp], xyz: NDArray[np.float32], pose: Floats) -> Floats:
+    def away_m(self, cell: NDArray[np.uint32], xyz: NDArray[np.float32], pose: Floats) -> Floats:
         """How far above the reference echoes of watched cells lie, seen from `pose`, metres."""
         plane = self.plane[cell]
         along, beneath = self.seen_from(pose)
@@ -136,6 +136,15 @@ class Cells:
     def seen_from(self, pose: Floats) -> tuple[Floats, Floats]:
         """Return normals of the planes in sensor axes, and how far along them the planes lie."""
         return self.normals @ pose[:3, :3], self.offsets_m - self.normals @ pose[:3, 3]
+
+    @cached_property
+    def patch(self) -> NDArray[np.intp]:
+        """Number of the patch that each cell lies on, by plane and then place, shape (cells,)."""
+        place = np.floor(self.ray_m / PATCH_M).astype(np.intp)
+        patch = np.column_stack([self.plane, place])
+        patch -= patch.min(axis=0)
+        number = np.ravel_multi_index(tuple(patch.T), tuple(patch.max(axis=0) + 1))
+        return np.asarray(np.unique(number, return_inverse=True)[1], dtype=np.intp).ravel()
 
     @cached_property
     def gate_m(self) -> Floats:
@@ -156,7 +165,7 @@ class Sums:
         self._count = np.zeros(size, dtype=np.intp)
         self._sum, self._squares = np.zeros(size), np.zeros(size)
 
-    def add(self, cell: NDArray[np.intp], xyz: NDArray[np.float32]) -> None:
+    def add(self, cell: NDArray[np.uint32], xyz: NDArray[np.float32]) -> None:
         """Add echoes; those of cells that are not watched do not count."""
         own, xyz = self._cells, np.ascontiguousarray(xyz)
         along, beneath = own.seen_from(self._pose)
@@ -198,14 +207,13 @@ class Sums:
 
 def patches(cells: Cells, seen: NDArray[np.intp]) -> NDArray[np.intp]:
     """Tell on which patch each cell lies, by number: roughness is alike within one."""
-    place = np.floor(cells.ray_m[seen] / PATCH_M).astype(np.intp)
-    patch = np.column_stack([cells.plane[seen], place])
-    patch -= patch.min(axis=0)
-    number = np.ravel_multi_index(tuple(patch.T), tuple(patch.max(axis=0) + 1))
-    return np.asarray(np.unique(number, return_inverse=True)[1], dtype=np.intp).ravel()
+    own = cells.patch[seen]
+    is_there = np.zeros(int(own.max(initial=-1)) + 1, dtype=np.intp)
+    is_there[own] = 1
+    return np.asarray((np.cumsum(is_there) - 1)[own], dtype=np.intp)
 
 
-def keys(echoes: HoldCloud | Sweep) -> NDArray[np.intp]:
+def keys(echoes: HoldCloud | Sweep) -> NDArray[np.uint32]:
     """Cell of every echo: channel, then azimuth."""
     return _native.echo_cells(
         np.ascontiguousarray(echoes.ring), np.ascontiguousarray(echoes.azimuth_deg), GRID

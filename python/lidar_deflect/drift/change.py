@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lidar_deflect import _native
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
@@ -109,16 +111,16 @@ def estimate(
     scatter of what is left, so that roughness met anew is in the covariance, and that again by
     how much larger the means over patches are than independent cells would make them.
     """
-    design = -np.hstack([np.cross(ray_m, normal), normal]) / sigma_m[:, None]
+    design = _native.pose_design(*map(np.ascontiguousarray, (ray_m, normal, sigma_m)))
     seen = height_m / sigma_m
     step: Floats = np.zeros(6)
     normal_matrix: Floats = np.zeros((6, 6))
     weight = np.ones(len(sigma_m))
     for _ in range(ROUNDS):
         left = seen - design @ step
-        scale = max(1.0, MAD_TO_SIGMA * float(np.median(np.abs(left))))
-        weight = np.minimum(1.0, HUBER * scale / np.maximum(np.abs(left), 1e-9)) / scale**2
-        weighted = (design * weight[:, None]).T
+        scale = max(1.0, MAD_TO_SIGMA * _native.median_size(left))
+        weight, rows = _native.huber_weighted(design, left, HUBER * scale, scale**2)
+        weighted = rows.T
         normal_matrix = weighted @ design + np.diag(PRIOR**-2)
         step = np.asarray(np.linalg.solve(normal_matrix, weighted @ seen))
     covariance = np.asarray(np.linalg.inv(normal_matrix))

@@ -31,11 +31,11 @@ class Echoes:
         Number of the cell, place in the sensor frame: shapes (n,), (n, 3).
     """
 
-    cell: NDArray[np.intp]
+    cell: NDArray[np.uint32]
     xyz: NDArray[np.float32]
 
     @classmethod
-    def thinned(cls, cell: NDArray[np.intp], xyz: NDArray[np.float32]) -> Echoes:
+    def thinned(cls, cell: NDArray[np.uint32], xyz: NDArray[np.float32]) -> Echoes:
         """At most `MOST` of these."""
         every = max(1, len(cell) // MOST)
         return cls(cell[::every], xyz[::every])

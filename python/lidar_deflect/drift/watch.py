@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect import _native
+from lidar_deflect import _native, memory
 from lidar_deflect.drift import told
 from lidar_deflect.drift.cells import GRID, MIN_CELLS, Cells, Plane
 from lidar_deflect.drift.echoes import Echoes, Kept
@@ -61,6 +62,9 @@ class Drift:
     unsure
         Lidar and span of time, nanoseconds, in which it does not stand where it is taken to stand;
         None for a lidar whose echoes are left out while it moves.
+    survey
+        First pass over the frames that were planned, if it is of use: made in the same reading,
+        with every tripod where it stood at first.
     """
 
     table: pl.DataFrame
@@ -68,21 +72,38 @@ class Drift:
     facts: Mapping[str, Any]
     moves: tuple[Move, ...] = ()
     unsure: tuple[tuple[str | None, int, int], ...] = ()
+    survey: _native.DistancePass | None = None
 
 
-def watch(inputs: Inputs) -> Drift:
-    """Watch every lidar from `start_ns` to `stop_ns` against the reference hold.
+def static_cells(inputs: Inputs) -> Mapping[str, Cells | None]:
+    """Find the static cells of every lidar in the reference hold; None without a surface.
 
     Where these captures have no reference hold, the first window stands for it: a tripod that
     moved before is not found then.
     """
-    cells = {lidar: _cells(inputs, lidar) for lidar in inputs.lidars}
+    return {lidar: _cells(inputs, lidar) for lidar in inputs.lidars}
+
+
+def watch(
+    inputs: Inputs,
+    cells: Mapping[str, Cells | None] | None = None,
+    frames: _native.FramePlan | None = None,
+) -> Drift:
+    """Watch every lidar from `start_ns` to `stop_ns`.
+
+    Parameters
+    ----------
+    cells
+        Static cells of every lidar, where they are known.
+    frames
+        Frames to make in the same reading.
+    """
+    cells = static_cells(inputs) if cells is None else cells
     blind = [lidar for lidar, own in cells.items() if own is None or own.seen < MIN_CELLS]
     watched = {
         id: Standing(id, own) for id, own in cells.items() if own is not None and id not in blind
     }
-    if watched:
-        _pass(inputs, watched)
+    survey = _pass(inputs, watched, frames) if watched else None
     moves = [move for lidar, own in watched.items() for move in _moves(inputs, lidar, own)]
     follows = inputs.config.calibrate.drift == "follow"
     windows = [window for own in watched.values() for window in own.windows]
@@ -96,6 +117,7 @@ def watch(inputs: Inputs) -> Drift:
         told_.facts | {"not_watched": blind, "window_s": WINDOW_NS * 1e-9},
         tuple(sorted(moves, key=lambda move: move.from_ns)) if follows else (),
         told_.unsure,
+        None if follows and moves else survey,
     )
 
 
@@ -131,24 +153,53 @@ def _reach_m(surface: Surface) -> float:
     return float(away.max()) + MARGIN_M
 
 
-def _pass(inputs: Inputs, watched: Mapping[str, Standing]) -> None:
+def _pass(
+    inputs: Inputs, watched: Mapping[str, Standing], frames: _native.FramePlan | None
+) -> _native.DistancePass | None:
     """Gather some sweeps of every window, and look at it when it is over."""
     standings = list(watched.values())
-    windows = _native.CellPass(
+    windows = _windows(inputs, watched, frames)
+    listener = None if frames is None else inputs.listener("survey")
+    looks: list[Future[None]] = []
+    with memory.own_pages(), ThreadPoolExecutor(1) as beside:  # the next windows are read meanwhile
+        while (ready := windows.advance(inputs.threads, listener)) is not None:
+            if ready:
+                _wait_for(looks)
+            while ready:
+                place, cell, xyz, from_ns, to_ns = ready.pop(0)
+                echoes = Echoes.thinned(cell, xyz)
+                looks.append(beside.submit(standings[place].look, echoes, from_ns, to_ns))
+        _wait_for(looks)
+    for standing in standings:
+        standing.finish()
+    return windows.survey() if isinstance(windows, _native.WatchedPass) else None
+
+
+def _wait_for(looks: list[Future[None]]) -> None:
+    while looks:
+        looks.pop(0).result()
+
+
+def _windows(
+    inputs: Inputs, watched: Mapping[str, Standing], frames: _native.FramePlan | None
+) -> _native.CellPass | _native.WatchedPass:
+    numbers = inputs.capture.numbers(list(watched))
+    every = [_one_in(inputs, lidar) for lidar in watched]
+    cells = [standing.cells.plane >= 0 for standing in watched.values()]
+    if frames is not None:
+        return _native.WatchedPass(
+            frames, lidars=numbers, every=every, watched=cells, grid=GRID, window_ns=WINDOW_NS
+        )
+    return _native.CellPass(
         inputs.capture.native,
-        lidars=inputs.capture.numbers(list(watched)),
-        every=[_one_in(inputs, lidar) for lidar in watched],
-        watched=[standing.cells.plane >= 0 for standing in standings],
+        lidars=numbers,
+        every=every,
+        watched=cells,
         grid=GRID,
         start_ns=inputs.start_ns,
         stop_ns=inputs.stop_ns,
         window_ns=WINDOW_NS,
     )
-    while (ready := windows.advance(inputs.threads)) is not None:
-        for place, cell, xyz, from_ns, to_ns in ready:
-            standings[place].look(Echoes.thinned(cell, xyz), from_ns, to_ns)
-    for standing in standings:
-        standing.finish()
 
 
 def _one_in(inputs: Inputs, lidar: str) -> int:

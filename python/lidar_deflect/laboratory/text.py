@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 _SEPARATORS = (";", "\t", ",", "|")
 _LOOKED_AT = 400
+_QUOTE = '"'
 _NUMBER = re.compile(r"^\s*[+-]?[\d.,]*\d[\d.,]*([eE][+-]?\d+)?\s*$")
 _TIME = re.compile(r"\d{1,4}[-./:]\d{1,2}[-./:]\d{1,4}")
 
@@ -65,14 +66,22 @@ def decoded(content: bytes) -> str:
 
 
 def _fields(line: str, separator: str) -> list[str]:
+    if _QUOTE not in line:
+        return [each.strip() for each in line.split(separator)]
     return [each.strip() for each in next(csv.reader([line], delimiter=separator), [])]
+
+
+def _count(line: str, separator: str) -> int:
+    if _QUOTE not in line:
+        return line.count(separator) + 1
+    return len(_fields(line, separator))
 
 
 def _dialect(lines: Sequence[str]) -> tuple[str, int]:
     """Separator and number of fields that most lines agree on."""
     best = (0.0, ",", 1)
     for separator in _SEPARATORS:
-        counts = Counter(len(_fields(line, separator)) for line in lines)
+        counts = Counter(_count(line, separator) for line in lines)
         count, agreed = max(counts.items(), key=lambda item: (item[1] * (item[0] > 1), item[0]))
         if count > 1 and agreed / len(lines) > best[0] + 1e-9:
             best = (agreed / len(lines), separator, count)

@@ -33,15 +33,16 @@ SAMPLE_POINTS = 500
 def contours_of(inputs: Inputs, plan: Plan) -> ContourRun:
     """Run steps 5 to 10 on every frame, in two passes: (10) needs the distances of the whole test.
 
-    The first pass keeps its frames as far as memory allows, so that a test of minutes is read once.
+    The first pass keeps its frames as far as memory allows, so that a test of minutes is read once;
+    it was made already where the tripods were watched in the same reading.
 
     Raises
     ------
     MeasurementError
         If no frame shows the blade at all.
     """
-    frames = _frame_plan(inputs, plan)
-    survey = _native.DistancePass(frames)
+    frames = frame_plan(inputs, plan)
+    survey = inputs.survey or _native.DistancePass(frames)
     while survey.advance(BLOCK_FRAMES, inputs.threads, inputs.listener("survey")):
         pass
     run = _native.ContourPass(
@@ -64,7 +65,7 @@ def contours_of(inputs: Inputs, plan: Plan) -> ContourRun:
     return contours
 
 
-def _frame_plan(inputs: Inputs, plan: Plan) -> _native.FramePlan:
+def frame_plan(inputs: Inputs, plan: Plan) -> _native.FramePlan:
     """Return what both passes need to make frames out of a capture."""
     return _native.FramePlan(
         inputs.capture.native,

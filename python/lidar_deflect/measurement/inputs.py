@@ -12,11 +12,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from lidar_deflect import _native
     from lidar_deflect.calibration import Calibration
     from lidar_deflect.capture import Capture
     from lidar_deflect.channels import Channel
     from lidar_deflect.config import Config
     from lidar_deflect.drift.move import Move
+    from lidar_deflect.measurement.plan import Plan
     from lidar_deflect.measurement.unloaded import HoldCloud
 
     Progress = Callable[[str, int, int], None]
@@ -44,6 +46,10 @@ class Inputs:
         Told the stage, what is done and what there is to do.
     moves
         Tripods that were moved and stand elsewhere from then on, in order of time.
+    plan
+        What the paper's method needs to know beforehand, where that was settled already.
+    survey
+        First pass over the frames, where it was made while the tripods were watched.
     """
 
     config: Config
@@ -59,6 +65,8 @@ class Inputs:
     progress: Progress | None = None
     threads: int | None = None
     moves: tuple[Move, ...] = ()
+    plan: Plan | None = None
+    survey: _native.DistancePass | None = None
 
     @property
     def period_ns(self) -> int:

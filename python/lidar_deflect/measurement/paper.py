@@ -69,6 +69,8 @@ def measure(inputs: Inputs) -> States:
 
 def plan_of(inputs: Inputs) -> Plan:
     """Return the plan of this capture's unloaded hold, else the one kept with the calibration."""
+    if inputs.plan is not None:
+        return inputs.plan
     if inputs.clouds:
         return make_plan(inputs.config, inputs.calibration, inputs.clouds)
     return Plan.from_dict(inputs.calibration.reference["paper"]["plan"])

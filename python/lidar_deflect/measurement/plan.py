@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lidar_deflect import instruments
+from lidar_deflect import _native, instruments
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.registration import UP
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from lidar_deflect.calibration import Calibration
+    from lidar_deflect.calibration import Calibration, Pose
     from lidar_deflect.config import Config
     from lidar_deflect.measurement.unloaded import HoldCloud
 
@@ -43,6 +43,7 @@ WALL_MARGIN_M = 1.0
 MIN_BLADE_POINTS = 100
 OUTLIERS_PERCENT = 0.5
 
+_COUNTED = 1 << 18
 _ROWS = 16_384
 """Points that are turned at a time: beyond, OpenBLAS shares the product out to threads, which may
 take fifty times as long for rows of three."""
@@ -98,18 +99,52 @@ class Plan:
         )
 
 
+@dataclass(frozen=True)
+class HoldView:
+    """What the plan takes of one lidar's hold, so that the hold itself need not be kept.
+
+    Attributes
+    ----------
+    blade_m
+        Points near the z axis and well above the ground, world frame, shape (n, 3).
+    step_deg
+        Azimuth steps between neighbouring shots of its busiest beam, shape (k,).
+    below_deg
+        Azimuth of the echo nearest to straight below.
+    """
+
+    blade_m: NDArray[np.float32]
+    step_deg: Floats
+    below_deg: float
+
+    @classmethod
+    def of(cls, config: Config, pose: Pose, cloud: HoldCloud) -> HoldView:
+        """Look at one lidar's hold."""
+        return cls(
+            _near_blade(config, pose, cloud),
+            _angular_steps(cloud),
+            _azimuth_below(cloud, pose.world_from_sensor),
+        )
+
+
 def make_plan(config: Config, calibration: Calibration, clouds: Mapping[str, HoldCloud]) -> Plan:
     """Settle what the configuration leaves open, from the unloaded hold."""
-    blade = _near_blade(config, calibration, clouds)
+    poses = {lidar: calibration.pose(lidar) for lidar in clouds}
+    return plan_of_views(
+        config, {lidar: HoldView.of(config, poses[lidar], own) for lidar, own in clouds.items()}
+    )
+
+
+def plan_of_views(config: Config, views: Mapping[str, HoldView]) -> Plan:
+    """Settle what the configuration leaves open, from what each lidar's hold showed."""
+    blade = _blade(config, list(views.values()))
     leading_edge, warnings = _chord_direction(config, blade)
+    steps = np.concatenate([view.step_deg for view in views.values()])
     return Plan(
         box_m=_box(config, blade),
-        alpha_deg=config.paper.alpha_deg or _angular_step(clouds),
+        alpha_deg=config.paper.alpha_deg or float(np.median(steps)),
         leading_edge=leading_edge,
-        cut_azimuth_deg={
-            lidar: _azimuth_below(cloud, calibration.pose(lidar).world_from_sensor)
-            for lidar, cloud in clouds.items()
-        },
+        cut_azimuth_deg={lidar: view.below_deg for lidar, view in views.items()},
         edge_on_above=bool(abs(leading_edge @ UP) > np.sqrt(0.5)),
         warnings=warnings,
     )
@@ -124,29 +159,36 @@ def _to_world(xyz: NDArray[np.float32], pose: Floats) -> NDArray[np.float32]:
     return np.asarray(moved, dtype=np.float32)
 
 
-def _near_blade(
-    config: Config, calibration: Calibration, clouds: Mapping[str, HoldCloud]
-) -> Floats:
+def _reach_of_axis_m(config: Config) -> float:
+    return max(NEAR_AXIS_MIN_M, NEAR_AXIS * config.blade.length_m)
+
+
+def _near_blade(config: Config, pose: Pose, cloud: HoldCloud) -> NDArray[np.float32]:
     """Points of the unloaded hold that lie near the z axis and well above the ground."""
-    reach = max(NEAR_AXIS_MIN_M, NEAR_AXIS * config.blade.length_m)
-    parts = []
-    for lidar, cloud in clouds.items():
-        xyz = _to_world(cloud.xyz, calibration.pose(lidar).world_from_sensor)
-        ground = calibration.pose(lidar).evidence.get("ground_height_m")
-        floor = -reach if ground is None else max(-reach, float(ground) + CLEARANCE_M)
-        near = (
-            (np.abs(xyz[:, 0]) < reach)
-            & (xyz[:, 1] > floor)
-            & (xyz[:, 1] < reach)
-            & (xyz[:, 2] > 0.0)
-            & (xyz[:, 2] < config.blade.length_m + MARGIN_M)
-        )
-        parts.append(xyz[near])
-    blade = np.concatenate(parts).astype(np.float64)
+    reach = _reach_of_axis_m(config)
+    ground = pose.evidence.get("ground_height_m")
+    floor = -reach if ground is None else max(-reach, float(ground) + CLEARANCE_M)
+    far = config.blade.length_m + MARGIN_M
+    box = np.array([[-reach, floor, 0.0], [reach, max(reach, floor + MARGIN_M), far]])
+    matrix = np.ascontiguousarray(pose.world_from_sensor, dtype=np.float64)
+    xyz = _to_world(_native.points_near_box(cloud.xyz, matrix, box), matrix)
+    near = (
+        (np.abs(xyz[:, 0]) < reach)
+        & (xyz[:, 1] > floor)
+        & (xyz[:, 1] < reach)
+        & (xyz[:, 2] > 0.0)
+        & (xyz[:, 2] < far)
+    )
+    return np.asarray(xyz[near])
+
+
+def _blade(config: Config, views: Sequence[HoldView]) -> Floats:
+    """Points of the unloaded blade of all lidars."""
+    blade = np.concatenate([view.blade_m for view in views]).astype(np.float64)
     if len(blade) < MIN_BLADE_POINTS:
         raise MeasurementError(
-            f"no blade within {reach:.1f} m of the z axis in the reference hold: "
-            f"{len(blade)} points, {MIN_BLADE_POINTS} needed",
+            f"no blade within {_reach_of_axis_m(config):.1f} m of the z axis in the reference "
+            f"hold: {len(blade)} points, {MIN_BLADE_POINTS} needed",
             code="measurement.no_blade",
             hint="check position_m and axes of the lidars, or set box_m of [paper]",
         )
@@ -211,20 +253,23 @@ def _chord_direction(config: Config, blade: Floats) -> tuple[Floats, tuple[str, 
     )
 
 
-def _angular_step(clouds: Mapping[str, HoldCloud]) -> float:
-    """Median azimuth between neighbouring shots of one beam, degrees."""
-    steps = []
-    for cloud in clouds.values():
-        of_beam = cloud.azimuth_deg[cloud.ring == np.bincount(cloud.ring).argmax()]
-        step = np.abs(np.diff(of_beam.astype(np.float64)))
-        steps.append(step[step > 0.0])
-    return float(np.median(np.concatenate(steps)))
+def _angular_steps(cloud: HoldCloud) -> Floats:
+    """Azimuths between neighbouring shots of one beam, degrees."""
+    beams = int(cloud.ring.max(initial=0)) + 1
+    count = np.zeros(beams, dtype=np.intp)
+    for first in range(0, len(cloud.ring), _COUNTED):  # a count widens what it counts
+        count += np.bincount(cloud.ring[first : first + _COUNTED], minlength=beams)
+    of_beam = cloud.azimuth_deg[cloud.ring == count.argmax()]
+    step = np.abs(np.diff(of_beam.astype(np.float64)))
+    return np.asarray(step[step > 0.0])
 
 
 def _azimuth_below(cloud: HoldCloud, world_from_sensor: Floats) -> float:
     """Azimuth of the echo nearest to straight below, whatever the sensor's sense of turn."""
-    down = world_from_sensor[:3, :3].T @ -UP
-    x, y, z = cloud.xyz.T  # column by column: rows of three are slow in numpy
+    down = np.ascontiguousarray(world_from_sensor[:3, :3].T @ -UP)
+    near = _native.points_nearest_to(cloud.xyz, down)
+    xyz = cloud.xyz[near]
+    x, y, z = xyz.T  # column by column: rows of three are slow in numpy
     range_m = np.sqrt((x * x + y * y) + z * z)
-    cosine = (cloud.xyz @ down.astype(np.float32)) / np.maximum(range_m, 1e-6)
-    return float(cloud.azimuth_deg[np.argmax(cosine)])
+    cosine = (xyz @ down.astype(np.float32)) / np.maximum(range_m, 1e-6)
+    return float(cloud.azimuth_deg[near[np.argmax(cosine)]])

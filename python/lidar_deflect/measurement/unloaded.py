@@ -102,8 +102,15 @@ def collect_all(
     lidars: Sequence[str],
     window: tuple[int, int],
     threads: int | None = None,
+    *,
+    with_intensity: bool = True,
 ) -> Mapping[str, HoldCloud]:
     """Gather the hold of every lidar, in one reading.
+
+    Parameters
+    ----------
+    with_intensity
+        Without, no target is found, and less memory taken.
 
     Raises
     ------
@@ -112,9 +119,17 @@ def collect_all(
     """
     numbers, (start_ns, stop_ns) = capture.numbers(lidars), window
     columns = _native.hold_echoes(
-        capture.native, lidars=numbers, start_ns=start_ns, stop_ns=stop_ns, threads=threads
+        capture.native,
+        lidars=numbers,
+        start_ns=start_ns,
+        stop_ns=stop_ns,
+        with_intensity=with_intensity,
+        threads=threads,
     )
-    clouds = {lidar: HoldCloud(*own) for lidar, own in zip(lidars, columns, strict=True)}
+    clouds = {
+        lidar: HoldCloud(xyz, ring, azimuth_deg, intensity if with_intensity else None)
+        for lidar, (xyz, ring, azimuth_deg, intensity) in zip(lidars, columns, strict=True)
+    }
     for lidar, cloud in clouds.items():
         if not len(cloud.xyz):
             raise _without_echo(capture, lidar, window)

@@ -205,8 +205,7 @@ impl<F> PointCloud<F> {
 
     /// The same, one by one.
     pub fn azimuths_deg(&self) -> impl Iterator<Item = f32> {
-        let degrees = |azimuth_rad: &f32| f64::from(*azimuth_rad).to_degrees() as f32;
-        self.azimuth_rad.iter().map(degrees)
+        self.azimuth_rad.iter().map(in_degrees)
     }
 
     /// Meanings of the returns as numbers: the place of each in the declaration of [`ReturnKind`].
@@ -249,6 +248,11 @@ impl<F> PointCloud<F> {
             frame: PhantomData,
         }
     }
+}
+
+/// An azimuth in degrees as files and cells have it.
+pub fn in_degrees(azimuth_rad: &f32) -> f32 {
+    f64::from(*azimuth_rad).to_degrees() as f32
 }
 
 #[cfg(test)]

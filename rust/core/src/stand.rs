@@ -94,6 +94,14 @@ impl Stands {
         &self.0[0] // made with one, never emptied
     }
 
+    /// The one stand of a lidar that never moved.
+    pub fn only(&self) -> Option<&Stand> {
+        match self.0.as_slice() {
+            [stand] => Some(stand),
+            _ => None,
+        }
+    }
+
     /// Whether the lidar moved within a span of time, both ends included.
     pub fn moves_within(&self, from_ns: i64, to_ns: i64) -> bool {
         let pairs = self.0.windows(2);

@@ -1,25 +1,28 @@
 //! Cuts a stream of returns into sweeps, one per turn: a state machine without input or output.
 
+mod kept;
 mod turns;
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
+use crate::angle::Arc;
 use crate::cloud::PointCloud;
 use crate::frame::Sensor;
 use crate::packet::{Decoded, Head};
 use crate::time::Timestamp;
+pub use kept::Kept;
 pub use turns::Turns;
 
 /// One turn of one lidar.
 #[derive(Debug, Clone)]
-pub struct Sweep {
+pub struct Sweep<K = PointCloud<Sensor>> {
     /// Number of the lidar among those of the capture.
     pub lidar: usize,
     /// Number of the turn since the lidar's first packet; turns of which nothing arrived are counted too.
     pub index: u32,
     /// Returns in the order of the shots.
-    pub cloud: PointCloud<Sensor>,
+    pub cloud: K,
     /// When the rotor passed the cut, or the first packet began.
     pub start: Timestamp,
     /// When the rotor passed the cut again, or the last packet ended.
@@ -60,21 +63,22 @@ pub struct Placed {
 
 /// Cuts at one azimuth.
 #[derive(Debug)]
-pub struct SweepCutter {
+pub struct SweepCutter<K = PointCloud<Sensor>> {
     lidar: usize,
     turns: Turns,
     visible_rad: f64,
     every: u32,
-    open: Option<Open>,
-    spare: Vec<PointCloud<Sensor>>,
+    bearings: Option<Arc>,
+    open: Option<Open<K>>,
+    spare: Vec<K>,
     usual: usize, // echoes of the last sweep: as much room is made for the next
 }
 
 /// The sweep that is being filled.
 #[derive(Debug)]
-struct Open {
+struct Open<K> {
     turn: u32,
-    cloud: PointCloud<Sensor>,
+    cloud: K,
     start: Timestamp,
     seen_rad: f64,
     packets: u32,
@@ -82,7 +86,7 @@ struct Open {
     gaps: Vec<Gap>,
 }
 
-impl SweepCutter {
+impl<K: Kept> SweepCutter<K> {
     /// Cuts at encoder azimuth `cut_rad`; `visible_rad` is the angle of the turn that the sensor sends.
     /// Turns come out whose number is a multiple of `every`.
     pub fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self {
@@ -91,6 +95,7 @@ impl SweepCutter {
             turns: Turns::new(cut_rad),
             visible_rad: visible_rad.clamp(1e-3, TAU),
             every: every.max(1),
+            bearings: None,
             open: None,
             spare: Vec::new(),
             usual: 0,
@@ -100,6 +105,17 @@ impl SweepCutter {
     /// Number of the lidar.
     pub fn lidar(&self) -> usize {
         self.lidar
+    }
+
+    /// The same where only returns within these bearings are wanted.
+    pub fn within(mut self, bearings: Option<Arc>) -> Self {
+        self.bearings = bearings;
+        self
+    }
+
+    /// Whether a packet may have returns that are wanted; `meets` tells whether it may have some within bearings.
+    pub fn is_wanted(&self, packet: &Placed, meets: &dyn Fn(Arc) -> bool) -> bool {
+        self.is_in_turn(packet) && self.bearings.is_none_or(meets)
     }
 
     /// Whether a packet may have returns of a turn that comes out.
@@ -121,13 +137,13 @@ impl SweepCutter {
     }
 
     /// Gives the memory of a sweep back for the next ones.
-    pub fn recycle(&mut self, mut cloud: PointCloud<Sensor>) {
-        cloud.clear();
+    pub fn recycle(&mut self, mut cloud: K) {
+        cloud.empty();
         self.spare.push(cloud);
     }
 
     /// Adds one packet; finished sweeps are appended to `out`.
-    pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep>) {
+    pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep<K>>) {
         let start_rad = self.turns.place(packet);
         let end_rad = start_rad + packet.head.turned_rad.max(0.0);
         let lost_behind_cut = self.add_lost(packet, start_rad);
@@ -154,7 +170,7 @@ impl SweepCutter {
     }
 
     /// The sweep that is not complete yet, at the end of the stream.
-    pub fn finish(&mut self, out: &mut VecDeque<Sweep>) {
+    pub fn finish(&mut self, out: &mut VecDeque<Sweep<K>>) {
         if let Some(end) = self.turns.end() {
             self.close(end.time, out);
         }
@@ -187,7 +203,7 @@ impl SweepCutter {
 
     fn open(&mut self, turn: u32, start: Timestamp) {
         let mut cloud = self.spare.pop().unwrap_or_default();
-        cloud.reserve(self.usual + self.usual / 16);
+        cloud.make_room(self.usual + self.usual / 16);
         self.open = Some(Open {
             turn,
             cloud,
@@ -199,12 +215,12 @@ impl SweepCutter {
         });
     }
 
-    fn close(&mut self, end: Timestamp, out: &mut VecDeque<Sweep>) {
+    fn close(&mut self, end: Timestamp, out: &mut VecDeque<Sweep<K>>) {
         let Some(open) = self.open.take() else { return };
         if !open.turn.is_multiple_of(self.every) {
             return self.recycle(open.cloud);
         }
-        self.usual = open.cloud.len();
+        self.usual = open.cloud.count();
         out.push_back(Sweep {
             lidar: self.lidar,
             index: open.turn,
@@ -225,7 +241,7 @@ impl SweepCutter {
         decoded: &Decoded,
         start_rad: f64,
         end_rad: f64,
-        out: &mut VecDeque<Sweep>,
+        out: &mut VecDeque<Sweep<K>>,
     ) {
         let mut from = 0;
         let mut from_rad = start_rad;
@@ -235,7 +251,7 @@ impl SweepCutter {
                 break;
             }
             let to = decoded.before(from, &packet.head, cut_rad - start_rad);
-            open.cloud.extend(&decoded.cloud, from..to);
+            open.cloud.take(&decoded.cloud, from..to);
             open.seen_rad += packet
                 .head
                 .seen_rad(from_rad - start_rad, cut_rad - start_rad);
@@ -246,7 +262,7 @@ impl SweepCutter {
             (from, from_rad) = (to, cut_rad);
         }
         if let Some(open) = &mut self.open {
-            open.cloud.extend(&decoded.cloud, from..decoded.cloud.len());
+            open.cloud.take(&decoded.cloud, from..decoded.cloud.len());
             open.seen_rad += packet
                 .head
                 .seen_rad(from_rad - start_rad, end_rad - start_rad);

@@ -2,8 +2,15 @@
 //!
 //! Sums go in the order of the echoes, one cell as any other.
 
+mod abreast;
+pub mod adjust;
+
+use std::ops::Range;
+
+use crate::cloud::PointCloud;
+use crate::frame::Sensor;
 use crate::stream::Taker;
-use crate::sweep::Sweep;
+use crate::sweep::{Kept, Sweep};
 
 /// How echoes fall into cells: so many steps of azimuth to a turn, and the turns of all beams in a row.
 #[derive(Debug, Clone, Copy)]
@@ -11,31 +18,26 @@ pub struct CellGrid {
     /// Step of azimuth, degrees.
     pub step_deg: f32,
     /// Steps to a turn.
-    pub steps: i64,
+    pub steps: u32,
     /// Beams beyond share the cells of this one.
     pub last_ring: u16,
 }
 
 impl CellGrid {
     /// Number of the cell of an echo; a beam without azimuth counts as at zero.
-    pub fn cell(&self, ring: u16, azimuth_deg: f32) -> i64 {
+    pub fn cell(&self, ring: u16, azimuth_deg: f32) -> u32 {
         let azimuth_deg = if azimuth_deg.is_nan() {
             0.0
         } else {
             azimuth_deg
         };
-        let steps = azimuth_deg / self.step_deg;
-        let step = steps as i64;
-        let step = if steps >= 0.0 && step < self.steps {
-            step // nearly all, without a division
-        } else {
-            (steps.floor() as i64).rem_euclid(self.steps)
-        };
-        i64::from(ring.min(self.last_ring)) * self.steps + step
+        let turn = i64::from(self.steps);
+        let step = ((azimuth_deg / self.step_deg).floor() as i64).rem_euclid(turn);
+        u32::from(ring.min(self.last_ring)) * self.steps + step as u32
     }
 
     /// Cells of echoes, by columns of one length.
-    pub fn cells(&self, rings: &[u16], azimuths_deg: &[f32]) -> Vec<i64> {
+    pub fn cells(&self, rings: &[u16], azimuths_deg: &[f32]) -> Vec<u32> {
         let echoes = rings.iter().zip(azimuths_deg);
         let cell = |(ring, azimuth_deg): (&u16, &f32)| self.cell(*ring, *azimuth_deg);
         echoes.map(cell).collect()
@@ -43,7 +45,7 @@ impl CellGrid {
 }
 
 /// Numbers of echoes by cell, and the sums of their positions by axis.
-pub fn positions(cells: &[i64], xyz_m: &[[f32; 3]], size: usize) -> (Vec<i64>, [Vec<f64>; 3]) {
+pub fn positions(cells: &[u32], xyz_m: &[[f32; 3]], size: usize) -> (Vec<i64>, [Vec<f64>; 3]) {
     let mut count = vec![0; size];
     let mut sums = [vec![0.0; size], vec![0.0; size], vec![0.0; size]];
     for (cell, xyz) in cells.iter().zip(xyz_m) {
@@ -89,41 +91,64 @@ pub struct Heights {
     pub squares_m2: Vec<f64>,
 }
 
+/// What the echoes of one cell are held against, in one place of memory.
+#[derive(Clone, Copy)]
+struct Surface {
+    plane: usize,
+    height_m: f64,
+    gate_m: f64,
+}
+
+/// Heights of one cell, in one place of memory.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    count: i64,
+    sum_m: f64,
+    squares_m2: f64,
+}
+
 /// Adds up the heights of echoes on watched cells.
 pub fn heights(
-    cells: &[i64],
+    cells: &[u32],
     xyz_m: &[[f32; 3]],
     reference: &Reference<'_>,
     planes: &[SeenPlane],
 ) -> Heights {
-    let size = reference.plane.len();
-    let mut found = Heights {
-        count: vec![0; size],
-        sum_m: vec![0.0; size],
-        squares_m2: vec![0.0; size],
+    let columns = reference.plane.iter().zip(reference.height_m);
+    let surface = |((plane, height_m), gate_m): ((&i64, &f64), &f64)| Surface {
+        plane: usize::try_from(*plane).unwrap_or(usize::MAX),
+        height_m: *height_m,
+        gate_m: *gate_m,
     };
+    let surfaces: Vec<Surface> = columns.zip(reference.gate_m).map(surface).collect();
+    let mut sums = vec![Sum::default(); surfaces.len()];
     for (cell, xyz) in cells.iter().zip(xyz_m) {
-        let Some(place) = place(*cell, size) else {
+        let Some(place) = place(*cell, surfaces.len()) else {
             continue;
         };
-        let plane = usize::try_from(reference.plane[place]);
-        let Some(plane) = plane.ok().and_then(|plane| planes.get(plane)) else {
+        let surface = &surfaces[place];
+        let Some(plane) = planes.get(surface.plane) else {
             continue;
         };
         let [x, y, z] = xyz.map(f64::from);
         let height = x * plane.along[0] + y * plane.along[1] + z * plane.along[2] - plane.beneath_m;
-        let away = height - reference.height_m[place];
-        if away.abs() < reference.gate_m[place] {
-            found.count[place] += 1;
-            found.sum_m[place] += away;
-            found.squares_m2[place] += away * away;
+        let away = height - surface.height_m;
+        if away.abs() < surface.gate_m {
+            let sum = &mut sums[place];
+            sum.count += 1;
+            sum.sum_m += away;
+            sum.squares_m2 += away * away;
         }
     }
-    found
+    Heights {
+        count: sums.iter().map(|sum| sum.count).collect(),
+        sum_m: sums.iter().map(|sum| sum.sum_m).collect(),
+        squares_m2: sums.iter().map(|sum| sum.squares_m2).collect(),
+    }
 }
 
-fn place(cell: i64, size: usize) -> Option<usize> {
-    usize::try_from(cell).ok().filter(|place| *place < size)
+fn place(cell: u32, size: usize) -> Option<usize> {
+    Some(cell as usize).filter(|place| *place < size)
 }
 
 /// Echoes on watched cells in one window of time.
@@ -132,7 +157,7 @@ pub struct Window {
     /// Number of the window, of the length that was asked for.
     number: i64,
     /// Cells of the echoes.
-    pub cell: Vec<i64>,
+    pub cell: Vec<u32>,
     /// Their places in the sensor frame, metres.
     pub xyz_m: Vec<[f32; 3]>,
     /// Start of the first sweep and end of the last, nanoseconds.
@@ -155,7 +180,14 @@ pub struct WindowTaker {
 
 impl WindowTaker {
     /// Windows of `length_ns` from `start_ns` on, of the cells that are watched.
-    pub fn new(grid: CellGrid, is_watched: Vec<bool>, start_ns: i64, length_ns: i64) -> Self {
+    /// About `usual` echoes are expected in each.
+    pub fn new(
+        grid: CellGrid,
+        is_watched: Vec<bool>,
+        start_ns: i64,
+        length_ns: i64,
+        usual: usize,
+    ) -> Self {
         Self {
             grid,
             is_watched,
@@ -163,8 +195,13 @@ impl WindowTaker {
             length_ns: length_ns.max(1),
             open: None,
             ready: Vec::new(),
-            usual: 0,
+            usual,
         }
+    }
+
+    /// Of a lidar that is not watched: no echo falls into a window.
+    pub fn idle(grid: CellGrid) -> Self {
+        Self::new(grid, Vec::new(), 0, i64::MAX, 0)
     }
 
     /// The windows that are over since the last call; with `is_last` also the one that lasts.
@@ -175,7 +212,7 @@ impl WindowTaker {
         std::mem::take(&mut self.ready)
     }
 
-    fn window(&mut self, sweep: &Sweep) -> &mut Window {
+    fn window(&mut self, sweep: &Sweep<CellEchoes>) -> &mut Window {
         let number = (sweep.start.0 - self.start_ns).div_euclid(self.length_ns);
         if let Some(over) = self.open.take_if(|open| open.number != number) {
             self.usual = over.cell.len();
@@ -193,27 +230,63 @@ impl WindowTaker {
 }
 
 impl Taker for WindowTaker {
-    fn take(&mut self, sweep: &Sweep) {
+    type Kept = CellEchoes;
+
+    fn take(&mut self, sweep: &Sweep<CellEchoes>) {
         let (grid, is_watched) = (self.grid, std::mem::take(&mut self.is_watched));
         let window = self.window(sweep);
         window.from_ns = window.from_ns.min(sweep.start.0);
         window.to_ns = window.to_ns.max(sweep.end.0);
-        let beams = sweep.cloud.ring.iter().zip(sweep.cloud.azimuths_deg());
-        for ((ring, azimuth_deg), xyz_m) in beams.zip(&sweep.cloud.xyz_m) {
-            let cell = grid.cell(*ring, azimuth_deg);
-            if place(cell, is_watched.len()).is_some_and(|place| is_watched[place]) {
+        let echoes = &sweep.cloud;
+        abreast::each(&grid, &echoes.ring, &echoes.azimuth_rad, |echo, cell| {
+            if is_watched.get(cell as usize).is_some_and(|is| *is) {
                 window.cell.push(cell);
-                window.xyz_m.push(*xyz_m);
+                window.xyz_m.push(echoes.xyz_m[echo]);
             }
-        }
+        });
         self.is_watched = is_watched;
+    }
+}
+
+/// Echoes of a sweep in the columns that tell their cells and heights.
+#[derive(Debug, Clone, Default)]
+pub struct CellEchoes {
+    xyz_m: Vec<[f32; 3]>,
+    ring: Vec<u16>,
+    azimuth_rad: Vec<f32>,
+}
+
+impl Kept for CellEchoes {
+    const IS_SLIM: bool = true;
+
+    fn take(&mut self, from: &PointCloud<Sensor>, places: Range<usize>) {
+        self.xyz_m.extend_from_slice(&from.xyz_m[places.clone()]);
+        self.ring.extend_from_slice(&from.ring[places.clone()]);
+        self.azimuth_rad
+            .extend_from_slice(&from.azimuth_rad[places]);
+    }
+
+    fn count(&self) -> usize {
+        self.xyz_m.len()
+    }
+
+    fn make_room(&mut self, additional: usize) {
+        self.xyz_m.reserve(additional);
+        self.ring.reserve(additional);
+        self.azimuth_rad.reserve(additional);
+    }
+
+    fn empty(&mut self) {
+        self.xyz_m.clear();
+        self.ring.clear();
+        self.azimuth_rad.clear();
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::{PointCloud, Return};
+    use crate::cloud::Return;
     use crate::time::Timestamp;
 
     const GRID: CellGrid = CellGrid {
@@ -261,7 +334,7 @@ mod tests {
         );
     }
 
-    fn sweep(start_ns: i64, azimuths_deg: &[f32]) -> Sweep {
+    fn sweep(start_ns: i64, azimuths_deg: &[f32]) -> Sweep<CellEchoes> {
         let mut cloud = PointCloud::default();
         for azimuth_deg in azimuths_deg {
             cloud.push(&Return {
@@ -269,10 +342,12 @@ mod tests {
                 ..Return::made_up([*azimuth_deg, 0.0, 0.0], Timestamp(start_ns))
             });
         }
+        let mut kept = CellEchoes::default();
+        kept.take(&cloud, 0..cloud.len());
         Sweep {
             lidar: 0,
             index: 0,
-            cloud,
+            cloud: kept,
             start: Timestamp(start_ns),
             end: Timestamp(start_ns + 10),
             coverage: 1.0,
@@ -284,7 +359,7 @@ mod tests {
 
     #[test]
     fn windows_hold_what_began_in_them_and_was_watched() {
-        let mut taker = WindowTaker::new(GRID, vec![false, true], 100, 50);
+        let mut taker = WindowTaker::new(GRID, vec![false, true], 100, 50, 0);
         for (start_ns, azimuths_deg) in [(100, [0.2, 0.7]), (140, [0.8, 9.0]), (150, [0.6, 0.1])] {
             taker.take(&sweep(start_ns, &azimuths_deg));
         }

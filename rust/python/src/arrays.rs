@@ -42,14 +42,17 @@ pub fn points<'a, T: numpy::Element>(
     name: &'static str,
     array: &'a PyReadonlyArray2<'_, T>,
 ) -> BorderResult<&'a [[T; 3]]> {
-    Ok(flat(
-        name,
-        "shape (n, 3) in C order",
-        array.shape()[1] == 3,
-        array,
-    )?
-    .as_chunks()
-    .0)
+    columns(name, "shape (n, 3) in C order", array)
+}
+
+/// The rows of a table of so many columns; `expected` says that in words.
+pub fn columns<'a, T: numpy::Element, const N: usize>(
+    name: &'static str,
+    expected: &'static str,
+    array: &'a PyReadonlyArray2<'_, T>,
+) -> BorderResult<&'a [[T; N]]> {
+    let is_wide = array.shape()[1] == N;
+    Ok(flat(name, expected, is_wide, array)?.as_chunks().0)
 }
 
 /// Borrows a contiguous array of `len` values, without a copy.

@@ -1,10 +1,13 @@
 //! The paper's two passes over a capture, in blocks of frames.
 
 mod feed;
+mod near;
 mod params;
 mod steps;
+mod watched;
 
 use lidar_deflect_core::error::InvalidValue;
+use lidar_deflect_core::paper::frames::Frame;
 use lidar_deflect_core::paper::kept::KeptFrames;
 use lidar_deflect_core::paper::series::{ContourSeries, DistanceRanges, Sampling};
 use lidar_deflect_core::paper::tip::Plane;
@@ -27,14 +30,16 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<FramePlan>()?;
     module.add_class::<FrameParams>()?;
     module.add_class::<DistancePass>()?;
+    module.add_class::<watched::WatchedPass>()?;
     module.add_class::<ContourPass>()?;
+    near::register(module)?;
     steps::register(module)
 }
 
 /// First pass: how far the blade is from each lidar over the whole test.
 #[pyclass(module = "lidar_deflect._native")]
 pub struct DistancePass {
-    feed: FrameFeed,
+    feed: Option<FrameFeed>, // none where the frames come from elsewhere
     sensors_m: Vec<Point3<f64>>,
     ranges: DistanceRanges,
     kept: KeptFrames,
@@ -44,12 +49,9 @@ pub struct DistancePass {
 impl DistancePass {
     #[new]
     fn new(py: Python<'_>, plan: &FramePlan) -> BorderResult<Self> {
-        let sensors_m = plan.sensors_m();
         Ok(Self {
-            feed: FrameFeed::open(py, plan)?,
-            ranges: DistanceRanges::new(sensors_m.len()),
-            sensors_m,
-            kept: KeptFrames::new(KEPT_BYTES),
+            feed: Some(FrameFeed::open(py, plan)?),
+            ..Self::fed(plan)
         })
     }
 
@@ -62,10 +64,12 @@ impl DistancePass {
         threads: Option<usize>,
         progress: Option<Py<PyAny>>,
     ) -> BorderResult<bool> {
-        let frames = self.feed.frames(py, count, threads, progress.as_ref())?;
-        self.ranges.extend(&frames, &self.sensors_m);
+        let Some(feed) = &mut self.feed else {
+            return Ok(false);
+        };
+        let frames = feed.frames(py, count, threads, progress.as_ref())?;
         let more = !frames.is_empty();
-        self.kept.extend(frames);
+        self.take(frames);
         Ok(more)
     }
 
@@ -77,6 +81,24 @@ impl DistancePass {
             .iter()
             .map(|range| range.unwrap_or([f64::NAN; 2]));
         Ok(arrays::rows(py, ranges.collect())?)
+    }
+}
+
+impl DistancePass {
+    /// To be fed with the frames of a plan.
+    fn fed(plan: &FramePlan) -> Self {
+        let sensors_m = plan.sensors_m();
+        Self {
+            feed: None,
+            ranges: DistanceRanges::new(sensors_m.len()),
+            sensors_m,
+            kept: KeptFrames::new(KEPT_BYTES),
+        }
+    }
+
+    fn take(&mut self, frames: Vec<Frame>) {
+        self.ranges.extend(&frames, &self.sensors_m);
+        self.kept.extend(frames);
     }
 }
 

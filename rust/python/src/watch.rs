@@ -1,6 +1,8 @@
 //! Static surfaces watched: cells of echoes, sums over them, and windows of a capture.
 
-use lidar_deflect_core::stream::{Beside, SweepOptions};
+mod adjust;
+
+use lidar_deflect_core::stream::{Beside, ScanReport, SweepOptions};
 use lidar_deflect_core::time::Timestamp;
 use lidar_deflect_core::watch::{
     self, CellGrid, Heights, Reference, SeenPlane, Window, WindowTaker,
@@ -18,13 +20,14 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<CellPass>()?;
     module.add_function(wrap_pyfunction!(echo_cells, module)?)?;
     module.add_function(wrap_pyfunction!(cell_positions, module)?)?;
-    module.add_function(wrap_pyfunction!(cell_heights, module)?)
+    module.add_function(wrap_pyfunction!(cell_heights, module)?)?;
+    adjust::register(module)
 }
 
 /// Step of azimuth in degrees, steps to a turn, last beam with cells of its own.
-type GridRow = (f32, i64, u16);
+pub type GridRow = (f32, u32, u16);
 
-fn grid_of((step_deg, steps, last_ring): GridRow) -> CellGrid {
+pub fn grid_of((step_deg, steps, last_ring): GridRow) -> CellGrid {
     CellGrid {
         step_deg,
         steps: steps.max(1),
@@ -39,7 +42,7 @@ fn echo_cells<'py>(
     ring: PyReadonlyArray1<'py, u16>,
     azimuth_deg: PyReadonlyArray1<'py, f32>,
     grid: GridRow,
-) -> BorderResult<Bound<'py, PyArray1<i64>>> {
+) -> BorderResult<Bound<'py, PyArray1<u32>>> {
     let ring = arrays::values("ring", &ring)?;
     let azimuth_deg = arrays::column("azimuth_deg", &azimuth_deg, ring.len())?;
     let grid = grid_of(grid);
@@ -54,7 +57,7 @@ type CellSums<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray2<f64>>);
 #[pyfunction]
 fn cell_positions<'py>(
     py: Python<'py>,
-    cells: PyReadonlyArray1<'py, i64>,
+    cells: PyReadonlyArray1<'py, u32>,
     xyz: PyReadonlyArray2<'py, f32>,
     size: usize,
 ) -> BorderResult<CellSums<'py>> {
@@ -73,7 +76,7 @@ fn cell_positions<'py>(
 #[allow(clippy::too_many_arguments, clippy::type_complexity)] // columns
 fn cell_heights<'py>(
     py: Python<'py>,
-    cells: PyReadonlyArray1<'py, i64>,
+    cells: PyReadonlyArray1<'py, u32>,
     xyz: PyReadonlyArray2<'py, f32>,
     plane: PyReadonlyArray1<'py, i64>,
     height_m: PyReadonlyArray1<'py, f64>,
@@ -114,6 +117,56 @@ fn cell_heights<'py>(
     ))
 }
 
+/// Which windows of which cells are gathered.
+pub struct Windows {
+    /// How echoes fall into cells.
+    pub grid: CellGrid,
+    /// Packets from here on.
+    pub start_ns: i64,
+    /// Packets before this.
+    pub stop_ns: i64,
+    /// Length of a window.
+    pub window_ns: i64,
+}
+
+impl Windows {
+    /// What each lidar is asked for, and what takes it: one turn in `every`, the cells that are watched.
+    pub fn takers(
+        &self,
+        report: &ScanReport,
+        lidars: &[usize],
+        every: &[u32],
+        watched: &[PyReadonlyArray1<'_, bool>],
+    ) -> BorderResult<Vec<(SweepOptions, WindowTaker)>> {
+        arrays::expect_rows("every", every.len(), lidars.len())?;
+        arrays::expect_rows("watched", watched.len(), lidars.len())?;
+        let lidars = lidars.iter().zip(every).zip(watched);
+        let takers = lidars.map(|((number, every), watched)| {
+            let watched = arrays::values("watched", watched)?.to_vec();
+            let info = report.lidars.get(*number);
+            let points = info.map_or(0.0, |info| info.points_within(self.window_ns));
+            let usual = (points / f64::from((*every).max(1))) as usize;
+            let (grid, start_ns) = (self.grid, self.start_ns);
+            let taker = WindowTaker::new(grid, watched, start_ns, self.window_ns, usual);
+            Ok((self.options(*number, *every), taker))
+        });
+        takers.collect()
+    }
+
+    /// For a lidar that is not watched: as little as can be.
+    pub fn idle(&self, lidar: usize) -> (SweepOptions, WindowTaker) {
+        (self.options(lidar, u32::MAX), WindowTaker::idle(self.grid))
+    }
+
+    fn options(&self, lidar: usize, every: u32) -> SweepOptions {
+        SweepOptions {
+            start: Some(Timestamp(self.start_ns)),
+            stop: Some(Timestamp(self.stop_ns)),
+            ..SweepOptions::of(&[lidar], &[0.0]).one_in(every)
+        }
+    }
+}
+
 /// Reads a capture and gives the echoes on watched cells, window by window.
 #[pyclass(module = "lidar_deflect._native")]
 pub struct CellPass {
@@ -121,9 +174,9 @@ pub struct CellPass {
 }
 
 /// Place of the lidar, cells, places of the echoes, start and end.
-type WindowRow<'py> = (
+pub type WindowRow<'py> = (
     usize,
-    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<u32>>,
     Bound<'py, PyArray2<f32>>,
     i64,
     i64,
@@ -147,19 +200,13 @@ impl CellPass {
         stop_ns: i64,
         window_ns: i64,
     ) -> BorderResult<Self> {
-        arrays::expect_rows("every", every.len(), lidars.len())?;
-        arrays::expect_rows("watched", watched.len(), lidars.len())?;
-        let mut takers = Vec::with_capacity(lidars.len());
-        for ((number, every), watched) in lidars.iter().zip(every).zip(&watched) {
-            let options = SweepOptions {
-                start: Some(Timestamp(start_ns)),
-                stop: Some(Timestamp(stop_ns)),
-                ..SweepOptions::of(&[*number], &[0.0]).one_in(every)
-            };
-            let watched = arrays::values("watched", watched)?.to_vec();
-            let taker = WindowTaker::new(grid_of(grid), watched, start_ns, window_ns);
-            takers.push((options, taker));
-        }
+        let windows = Windows {
+            grid: grid_of(grid),
+            start_ns,
+            stop_ns,
+            window_ns,
+        };
+        let takers = windows.takers(&scan.report, &lidars, &every, &watched)?;
         let beside = Beside::new(&scan.report, takers)?;
         Ok(Self {
             feed: ReadingFeed::open(py, &scan.paths, beside)?,
@@ -189,7 +236,8 @@ impl CellPass {
     }
 }
 
-fn row(py: Python<'_>, place: usize, window: Window) -> PyResult<WindowRow<'_>> {
+/// One window as Python gets it.
+pub fn row(py: Python<'_>, place: usize, window: Window) -> PyResult<WindowRow<'_>> {
     let cells = window.cell.into_pyarray(py);
     let xyz = arrays::rows(py, window.xyz_m)?;
     Ok((place, cells, xyz, window.from_ns, window.to_ns))

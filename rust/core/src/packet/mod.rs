@@ -399,6 +399,9 @@ pub struct Decoded {
     pub merged: u64,
     /// Blocks that were left out, by reason.
     pub drops: Drops,
+    /// Nobody looks at more of the cloud than places, instants, azimuths and beams: a decoder may leave the other
+    /// columns empty.
+    pub is_slim: bool,
 }
 
 impl Decoded {

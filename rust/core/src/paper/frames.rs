@@ -1,13 +1,16 @@
 //! Frames on the common clock: of every lidar the sweep whose middle is nearest.
 
 use std::collections::VecDeque;
+use std::ops::Range;
 
 use nalgebra::Point3;
 
 use super::passthrough::PassThrough;
+use crate::cloud::PointCloud;
 use crate::error::InvalidValue;
+use crate::frame::Sensor;
 use crate::stand::Stands;
-use crate::sweep::{Gap, Sweep};
+use crate::sweep::{Gap, Kept, Sweep};
 use crate::time::Timestamp;
 
 /// A packet that is missing this close to the blade's first or last shot may have held its edge:
@@ -144,26 +147,67 @@ fn nearest(queue: &mut VecDeque<(Timestamp, Share)>, time: Timestamp, reach_ns: 
         .unwrap_or_default()
 }
 
+/// Echoes of a sweep in the columns that a share is made of.
+#[derive(Debug, Clone, Default)]
+pub struct ShareEchoes {
+    xyz_m: Vec<[f32; 3]>,
+    time_ns: Vec<i64>,
+    ring: Vec<u16>,
+}
+
+impl Kept for ShareEchoes {
+    const IS_SLIM: bool = true;
+
+    fn take(&mut self, from: &PointCloud<Sensor>, places: Range<usize>) {
+        self.xyz_m.extend_from_slice(&from.xyz_m[places.clone()]);
+        self.time_ns
+            .extend_from_slice(&from.time_ns[places.clone()]);
+        self.ring.extend_from_slice(&from.ring[places]);
+    }
+
+    fn count(&self) -> usize {
+        self.xyz_m.len()
+    }
+
+    fn make_room(&mut self, additional: usize) {
+        self.xyz_m.reserve(additional);
+        self.time_ns.reserve(additional);
+        self.ring.reserve(additional);
+    }
+
+    fn empty(&mut self) {
+        self.xyz_m.clear();
+        self.time_ns.clear();
+        self.ring.clear();
+    }
+}
+
 /// What a sweep gives to a frame, and its middle. Echoes of a lidar on the move do not count.
-pub fn share_of(sweep: &Sweep, stands: &Stands, pass: &PassThrough) -> (Timestamp, Share) {
-    // Room for all at once; the frame takes a copy of the size that it needs.
+pub fn share_of(
+    sweep: &Sweep<ShareEchoes>,
+    stands: &Stands,
+    pass: &PassThrough,
+) -> (Timestamp, Share) {
+    let echoes = &sweep.cloud;
+    let places = may_pass(echoes, stands, pass);
     let mut share = Share {
         present: true,
-        points_m: Vec::with_capacity(sweep.cloud.len()),
-        rings: Vec::with_capacity(sweep.cloud.len()),
+        points_m: Vec::with_capacity(places.len()),
+        rings: Vec::with_capacity(places.len()),
         lost_on_blade: false,
     };
     let mut seen: Option<Gap> = None; // first and last shot that passed
-    for (index, xyz) in sweep.cloud.xyz_m.iter().enumerate() {
-        let Some(stand) = stands.at(sweep.cloud.time_ns[index]) else {
+    for index in places {
+        let Some(stand) = stands.at(echoes.time_ns[index]) else {
             continue; // on the move
         };
-        let point = stand.pose.transform(&Point3::from(xyz.map(f64::from)));
+        let point = Point3::from(echoes.xyz_m[index].map(f64::from));
+        let point = stand.pose.transform(&point);
         let point = [point.x as f32, point.y as f32, point.z as f32];
         if pass.contains(&point) {
             share.points_m.push(point);
-            share.rings.push(sweep.cloud.ring[index]);
-            let time = Timestamp(sweep.cloud.time_ns[index]);
+            share.rings.push(echoes.ring[index]);
+            let time = Timestamp(echoes.time_ns[index]);
             seen = Some(Gap {
                 from: seen.map_or(time, |s| s.from.min(time)),
                 to: time,
@@ -178,17 +222,29 @@ pub fn share_of(sweep: &Sweep, stands: &Stands, pass: &PassThrough) -> (Timestam
     (sweep.start + (sweep.end - sweep.start) / 2, share)
 }
 
+/// Places of the echoes that may lie in the box; those of a lidar that was moved all may.
+fn may_pass(echoes: &ShareEchoes, stands: &Stands, pass: &PassThrough) -> Vec<usize> {
+    let mut places = Vec::new();
+    match stands.only() {
+        Some(stand) => pass
+            .near(&stand.pose)
+            .places(&echoes.xyz_m, |place| places.push(place)),
+        None => places.extend(0..echoes.count()),
+    }
+    places
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::{PointCloud, Return};
+    use crate::cloud::Return;
     use crate::frame::WorldFromSensor;
     use nalgebra::{Rotation3, Vector3};
 
     const PERIOD: i64 = 100_000_000;
 
     /// A sweep with one echo per millisecond around `middle`, at x = 1 .. 5 m of the sensor.
-    fn sweep(lidar: usize, middle: i64, gaps: Vec<Gap>) -> Sweep {
+    fn sweep(lidar: usize, middle: i64, gaps: Vec<Gap>) -> Sweep<ShareEchoes> {
         let mut cloud = PointCloud::default();
         for k in 0..5i64 {
             let time = Timestamp(middle + (k - 2) * 1_000_000);
@@ -197,10 +253,12 @@ mod tests {
                 ..Return::made_up([1.0 + k as f32, 0.0, 0.0], time)
             });
         }
+        let mut kept = ShareEchoes::default();
+        kept.take(&cloud, 0..cloud.len());
         Sweep {
             lidar,
             index: 0,
-            cloud,
+            cloud: kept,
             start: Timestamp(middle - PERIOD / 2),
             end: Timestamp(middle + PERIOD / 2),
             coverage: 1.0,
@@ -214,7 +272,7 @@ mod tests {
         FrameAssembler::new(lidars, Timestamp(0), PERIOD).unwrap()
     }
 
-    fn push(frames: &mut FrameAssembler, sweep: &Sweep) {
+    fn push(frames: &mut FrameAssembler, sweep: &Sweep<ShareEchoes>) {
         let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::new(0.0, 0.0, 80.0));
         let pass = PassThrough::new([1.5, -1.0, 70.0], [9.0, 1.0, 90.0]).unwrap();
         let (middle, share) = share_of(sweep, &Stands::still(sweep.lidar, pose), &pass);

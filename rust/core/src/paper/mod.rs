@@ -3,7 +3,7 @@
 //! | step | here |
 //! |---|---|
 //! | 2-4 ground, rotation, yaw | [`crate::register`] |
-//! | 5 pass-through | [`passthrough`] |
+//! | 5 pass-through | [`passthrough`], told quickly by [`near`] |
 //! | frames on the common clock | [`frames`], out of datagrams [`reader`] |
 //! | 6 dynamic-radius DBSCAN (9), (10) | [`crate::cluster`] |
 //! | 7 extremes of the scan lines | [`crate::blade::contour`] |
@@ -18,6 +18,7 @@ pub mod curves;
 pub mod frame;
 pub mod frames;
 pub mod kept;
+pub mod near;
 pub mod passthrough;
 pub mod reader;
 pub mod sections;

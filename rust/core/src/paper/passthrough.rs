@@ -2,8 +2,10 @@
 
 use nalgebra::Point3;
 
+use super::near::NearBox;
 use crate::angle::{Arc, wrap_turn};
 use crate::error::InvalidValue;
+use crate::frame::WorldFromSensor;
 use crate::stand::Stands;
 
 /// A box that comes nearer to the spin axis than this may be seen in any direction, metres.
@@ -56,6 +58,11 @@ impl PassThrough {
         })
     }
 
+    /// What tells quickly which points of a lidar may lie in the box.
+    pub fn near(&self, pose: &WorldFromSensor) -> NearBox {
+        NearBox::new(pose, &self.min_m, &self.max_m)
+    }
+
     /// The eight corners of the box, a little farther out.
     fn corners(&self) -> [Point3<f64>; 8] {
         std::array::from_fn(|corner| {
@@ -84,7 +91,6 @@ impl PassThrough {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::WorldFromSensor;
     use nalgebra::{Rotation3, Vector3};
 
     #[test]

@@ -1,14 +1,15 @@
 //! Frames out of datagrams: every lidar's packets, sweeps and shares on a thread of their own.
 
-use super::frames::{Frame, FrameAssembler, Share, share_of};
+use super::frames::{Frame, FrameAssembler, Share, ShareEchoes, share_of};
 use super::passthrough::PassThrough;
 use crate::capture::DatagramBatch;
 use crate::error::{InvalidValue, ReadError};
 use crate::frame::WorldFromSensor;
 use crate::stand::{Move, Stands};
-use crate::stream::{Beside, Reading, ScanReport, SweepOptions, Taker};
+use crate::stream::{Beside, BothBeside, Reading, ScanReport, SweepOptions, Taker};
 use crate::sweep::Sweep;
 use crate::time::Timestamp;
+use crate::watch::WindowTaker;
 
 /// Sweeps before a frame that its shares may need, and the decoder to have got going.
 const RUN_UP_NS: i64 = 2_000_000_000;
@@ -59,16 +60,37 @@ impl FramePlan {
 }
 
 /// Turns batches of datagrams into frames; the frames do not depend on the number of threads.
-pub struct FrameReader {
-    lidars: Beside<ShareTaker>,
+pub struct FrameReader<L = Beside<ShareTaker>> {
+    lidars: L,
     assembler: FrameAssembler,
 }
 
+/// Frames, and beside them windows of the same packets in which tripods are watched.
+pub type WatchedReader = FrameReader<BothBeside<ShareTaker, WindowTaker>>;
+
 /// Makes shares of one lidar's sweeps.
-struct ShareTaker {
+pub struct ShareTaker {
     stands: Stands,
     pass: PassThrough,
     shares: Vec<(Timestamp, Share)>,
+}
+
+/// Lidars whose sweeps become shares.
+pub trait Shares: Reading {
+    /// The takers, in the order of the frames' lidars.
+    fn shares(&mut self) -> impl Iterator<Item = &mut ShareTaker>;
+}
+
+impl Shares for Beside<ShareTaker> {
+    fn shares(&mut self) -> impl Iterator<Item = &mut ShareTaker> {
+        self.takers()
+    }
+}
+
+impl<B: Taker> Shares for BothBeside<ShareTaker, B> {
+    fn shares(&mut self) -> impl Iterator<Item = &mut ShareTaker> {
+        self.takers().map(|takers| &mut takers.0)
+    }
 }
 
 impl FrameReader {
@@ -77,25 +99,59 @@ impl FrameReader {
     /// # Errors
     /// [`ReadError`] where a lidar cannot be decoded or the plan makes no sense.
     pub fn new(report: &ScanReport, plan: &FramePlan) -> Result<Self, ReadError> {
-        let count = plan.lidars.len();
-        check_length("poses", plan.poses.len(), count)?;
-        check_length("cut_azimuth_rad", plan.cut_azimuth_rad.len(), count)?;
-        let lidar = |(place, stands): (usize, Stands)| {
-            let options = plan.options(place, &stands);
-            let (pass, shares) = (plan.pass, Vec::new());
-            (
-                options,
-                ShareTaker {
-                    stands,
-                    pass,
-                    shares,
-                },
-            )
-        };
-        let stands = Stands::of(&plan.poses, &plan.moves)?.into_iter();
+        let takers = takers_of(plan)?;
+        Self::of(plan, Beside::new(report, takers)?)
+    }
+}
+
+impl WatchedReader {
+    /// The same beside windows: of every lidar of the plan which turns are watched, and what takes them.
+    ///
+    /// # Errors
+    /// [`ReadError`] where a lidar cannot be decoded or the plan makes no sense.
+    pub fn watched(
+        report: &ScanReport,
+        plan: &FramePlan,
+        windows: Vec<(SweepOptions, WindowTaker)>,
+    ) -> Result<Self, ReadError> {
+        check_length("windows", windows.len(), plan.lidars.len())?;
+        let takers = takers_of(plan)?.into_iter().zip(windows);
+        let lidars = plan.lidars.iter().zip(takers);
+        let lidars = lidars.map(|(lidar, (share, window))| (*lidar, share, window));
+        Self::of(plan, BothBeside::new(report, lidars)?)
+    }
+
+    /// What takes the windows of each lidar.
+    pub fn windows(&mut self) -> impl Iterator<Item = &mut WindowTaker> {
+        self.lidars.takers().map(|takers| &mut takers.1)
+    }
+}
+
+fn takers_of(plan: &FramePlan) -> Result<Vec<(SweepOptions, ShareTaker)>, ReadError> {
+    let count = plan.lidars.len();
+    check_length("poses", plan.poses.len(), count)?;
+    check_length("cut_azimuth_rad", plan.cut_azimuth_rad.len(), count)?;
+    let taker = |(place, stands): (usize, Stands)| {
+        let options = plan.options(place, &stands);
+        let (pass, shares) = (plan.pass, Vec::new());
+        (
+            options,
+            ShareTaker {
+                stands,
+                pass,
+                shares,
+            },
+        )
+    };
+    let stands = Stands::of(&plan.poses, &plan.moves)?.into_iter();
+    Ok(stands.enumerate().map(taker).collect())
+}
+
+impl<L: Shares> FrameReader<L> {
+    fn of(plan: &FramePlan, lidars: L) -> Result<Self, ReadError> {
         Ok(Self {
-            lidars: Beside::new(report, stands.enumerate().map(lidar))?,
-            assembler: FrameAssembler::new(count, plan.first, plan.period_ns)?,
+            lidars,
+            assembler: FrameAssembler::new(plan.lidars.len(), plan.first, plan.period_ns)?,
         })
     }
 
@@ -105,7 +161,7 @@ impl FrameReader {
     }
 
     fn assemble(&mut self) {
-        for (place, taker) in self.lidars.takers().enumerate() {
+        for (place, taker) in self.lidars.shares().enumerate() {
             for (middle, share) in taker.shares.drain(..) {
                 self.assembler.push(place, middle, share);
             }
@@ -113,7 +169,7 @@ impl FrameReader {
     }
 }
 
-impl Reading for FrameReader {
+impl<L: Shares> Reading for FrameReader<L> {
     fn push(&mut self, batch: &DatagramBatch) {
         self.lidars.push(batch);
         self.assemble();
@@ -131,7 +187,9 @@ impl Reading for FrameReader {
 }
 
 impl Taker for ShareTaker {
-    fn take(&mut self, sweep: &Sweep) {
+    type Kept = ShareEchoes;
+
+    fn take(&mut self, sweep: &Sweep<ShareEchoes>) {
         self.shares.push(share_of(sweep, &self.stands, &self.pass));
     }
 }

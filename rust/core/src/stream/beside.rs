@@ -2,15 +2,19 @@
 
 use rayon::prelude::*;
 
-use super::{ScanReport, SweepOptions, SweepReader};
+use super::reader::Reader;
+use super::{ScanReport, SweepOptions};
 use crate::capture::DatagramBatch;
 use crate::error::ReadError;
-use crate::sweep::Sweep;
+use crate::sweep::{Kept, Sweep, SweepCutter};
 
 /// What becomes of one lidar's sweeps.
 pub trait Taker: Send {
+    /// The columns that it looks at.
+    type Kept: Kept;
+
     /// Takes the next sweep, in order of time.
-    fn take(&mut self, sweep: &Sweep);
+    fn take(&mut self, sweep: &Sweep<Self::Kept>);
 }
 
 /// What batches of datagrams are read into.
@@ -26,12 +30,12 @@ pub trait Reading: Send {
 }
 
 /// Lidars side by side, each with its taker; what they take does not depend on the number of threads.
-pub struct Beside<T> {
+pub struct Beside<T: Taker> {
     lanes: Vec<Lane<T>>,
 }
 
-struct Lane<T> {
-    reader: SweepReader,
+struct Lane<T: Taker> {
+    reader: Reader<SweepCutter<T::Kept>>,
     taker: T,
 }
 
@@ -45,7 +49,7 @@ impl<T: Taker> Beside<T> {
         lidars: impl IntoIterator<Item = (SweepOptions, T)>,
     ) -> Result<Self, ReadError> {
         let lane = |(options, taker): (SweepOptions, T)| {
-            let reader = SweepReader::new(report, &options)?;
+            let reader = Reader::new(report, &options)?;
             Ok(Lane { reader, taker })
         };
         let lanes = lidars.into_iter().map(lane);

@@ -5,6 +5,7 @@
 
 mod arrivals;
 mod beside;
+mod both;
 mod cut;
 mod hold;
 mod keys;
@@ -24,6 +25,7 @@ use crate::packet::unit::UnitFile;
 use crate::packet::{ModelRef, pieces, unit_models};
 
 pub use beside::{Beside, Reading, Taker};
+pub use both::{Both, BothBeside};
 pub use cut::CaptureCut;
 pub use hold::HoldEchoes;
 pub use points::{PointBlock, PointReader, PointTagger};

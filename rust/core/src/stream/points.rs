@@ -1,6 +1,6 @@
 //! Points in the order of arrival, each with its lidar and turn.
 
-use super::reader::{Reader, Sink};
+use super::reader::{Reader, Sink, SweepOptions};
 use crate::cloud::PointCloud;
 use crate::frame::Sensor;
 use crate::packet::Decoded;
@@ -47,10 +47,10 @@ impl Reader<PointTagger> {
 impl Sink for PointTagger {
     type Out = PointBlock;
 
-    fn new(lidar: usize, cut_rad: f64, _visible_rad: f64, _every: u32) -> Self {
+    fn new(lidar: usize, _visible_rad: f64, options: &SweepOptions) -> Self {
         Self {
             lidar: lidar as u16,
-            turns: Turns::new(cut_rad),
+            turns: Turns::new(options.cut_rad(lidar)),
             turn: 0,
         }
     }

@@ -8,14 +8,12 @@ use super::{ScanOptions, StreamKey, packets};
 use crate::angle::Arc;
 use crate::capture::Datagram;
 use crate::clock::ClockModel;
-use crate::cloud::PointCloud;
 use crate::drops::Drops;
 use crate::error::{InvalidValue, ReadError, UnitError};
-use crate::frame::Sensor;
 use crate::loss::view::FieldOfView;
 use crate::packet::split::Following;
 use crate::packet::{Decoded, Decoder, ModelRef, PacketKind, Place};
-use crate::sweep::{Placed, Sweep, SweepCutter};
+use crate::sweep::{Kept, Placed, Sweep, SweepCutter};
 use crate::time::Timestamp;
 
 /// Which sweeps to make.
@@ -34,6 +32,8 @@ pub struct SweepOptions {
     pub start: Option<Timestamp>,
     /// Packets from this on are left out.
     pub stop: Option<Timestamp>,
+    /// What else is wanted of the same packets: its cuts, bearings and turns, for [`super::Both`].
+    pub beside: Option<Box<SweepOptions>>,
 }
 
 impl SweepOptions {
@@ -56,6 +56,17 @@ impl SweepOptions {
         self
     }
 
+    /// The same where other sweeps of the same packets are wanted beside them.
+    pub fn beside(mut self, other: Self) -> Self {
+        self.beside = Some(Box::new(other));
+        self
+    }
+
+    /// Azimuth at which the sweeps of a lidar are cut.
+    pub fn cut_rad(&self, lidar: usize) -> f64 {
+        self.cut_azimuth_rad.get(lidar).copied().unwrap_or(0.0)
+    }
+
     /// The same where of each of these lidars only returns within its bearings are wanted.
     pub fn towards(
         mut self,
@@ -75,12 +86,14 @@ pub trait Sink {
     /// Where all lidars' results are gathered.
     type Out: Default;
 
-    /// For the lidar with this number; `visible_rad` is the angle of the turn that it sends, and of
-    /// its turns one in `every` is wanted.
-    fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self;
+    /// Whether it looks at no more than [`Decoded::is_slim`] says.
+    const IS_SLIM: bool = false;
 
-    /// Whether a packet may have returns of a turn that is wanted.
-    fn is_in_turn(&self, _packet: &Placed) -> bool {
+    /// For the lidar with this number; `visible_rad` is the angle of the turn that it sends.
+    fn new(lidar: usize, visible_rad: f64, options: &SweepOptions) -> Self;
+
+    /// Whether a packet may have returns that are wanted; `meets` tells whether it may have some within bearings.
+    fn wants(&mut self, _packet: &Placed, _meets: &dyn Fn(Arc) -> bool) -> bool {
         true
     }
 
@@ -122,7 +135,6 @@ struct Lane<S> {
     decoder: Box<dyn Decoder>,
     clock: ClockModel,
     view: FieldOfView,
-    bearings: Option<Arc>,
     sink: S,
     spare: Vec<Vec<u8>>,
     /// A packet whose last firing may go on in the next one.
@@ -153,7 +165,10 @@ impl<S: Sink> Reader<S> {
             options: report.options.clone(),
             lanes,
             out: S::Out::default(),
-            decoded: Decoded::default(),
+            decoded: Decoded {
+                is_slim: S::IS_SLIM,
+                ..Decoded::default()
+            },
             limits: Limits {
                 start: options.start,
                 stop: options.stop,
@@ -222,9 +237,7 @@ struct Step<'a, Out> {
 
 impl<S: Sink> Lane<S> {
     fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, UnitError> {
-        let cut_rad = options.cut_azimuth_rad.get(number).copied().unwrap_or(0.0);
         let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
-        let every = options.every.get(number).copied().unwrap_or(1);
         Ok(Self {
             key: info.key,
             number,
@@ -234,8 +247,7 @@ impl<S: Sink> Lane<S> {
             decoder: info.model.fit(&info.unit)?.decoder,
             clock: info.clock.clone(),
             view: info.view.clone(),
-            bearings: options.bearings.get(number).copied().flatten(),
-            sink: S::new(number, cut_rad, visible_rad, every),
+            sink: S::new(number, visible_rad, options),
             spare: Vec::new(),
             held: None,
             is_done: false,
@@ -324,16 +336,12 @@ impl<S: Sink> Lane<S> {
             packet: ticket.packet,
             mean_rate_rad_per_ns: ticket.mean_rate_rad_per_ns,
         };
-        if self.is_wanted(payload, &placed) {
+        let meets = |bearings: Arc| self.decoder.may_meet(payload, bearings);
+        if self.sink.wants(&placed, &meets) {
             self.decoder
                 .decode_before(payload, following, place, step.decoded);
         }
         self.sink.push(&placed, step.decoded, step.out);
-    }
-
-    fn is_wanted(&self, payload: &[u8], placed: &Placed) -> bool {
-        let meets = |bearings: Arc| self.decoder.may_meet(payload, bearings);
-        self.sink.is_in_turn(placed) && self.bearings.is_none_or(meets)
     }
 
     fn finish(&mut self, step: &mut Step<'_, S::Out>) {
@@ -346,9 +354,9 @@ impl<S: Sink> Lane<S> {
     }
 }
 
-impl Reader<SweepCutter> {
+impl<K: Kept> Reader<SweepCutter<K>> {
     /// The next complete sweep.
-    pub fn pop(&mut self) -> Option<Sweep> {
+    pub fn pop(&mut self) -> Option<Sweep<K>> {
         self.out.pop_front()
     }
 
@@ -358,23 +366,35 @@ impl Reader<SweepCutter> {
     }
 
     /// Gives the memory of a sweep back for the next ones of its lidar.
-    pub fn recycle(&mut self, lidar: usize, cloud: PointCloud<Sensor>) {
-        let mut lanes = self.lanes.iter_mut();
-        if let Some(lane) = lanes.find(|lane| lane.number == lidar) {
-            lane.sink.recycle(cloud);
+    pub fn recycle(&mut self, lidar: usize, kept: K) {
+        if let Some(sink) = self.sink_of(lidar) {
+            sink.recycle(kept);
         }
     }
 }
 
-impl Sink for SweepCutter {
-    type Out = VecDeque<Sweep>;
+impl<S: Sink> Reader<S> {
+    /// What takes the returns of a lidar.
+    pub(super) fn sink_of(&mut self, lidar: usize) -> Option<&mut S> {
+        let mut lanes = self.lanes.iter_mut();
+        let own = lanes.find(|lane| lane.number == lidar);
+        own.map(|lane| &mut lane.sink)
+    }
+}
 
-    fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self {
-        SweepCutter::new(lidar, cut_rad, visible_rad, every)
+impl<K: Kept> Sink for SweepCutter<K> {
+    type Out = VecDeque<Sweep<K>>;
+
+    const IS_SLIM: bool = K::IS_SLIM;
+
+    fn new(lidar: usize, visible_rad: f64, options: &SweepOptions) -> Self {
+        let every = options.every.get(lidar).copied().unwrap_or(1);
+        let bearings = options.bearings.get(lidar).copied().flatten();
+        SweepCutter::new(lidar, options.cut_rad(lidar), visible_rad, every).within(bearings)
     }
 
-    fn is_in_turn(&self, packet: &Placed) -> bool {
-        SweepCutter::is_in_turn(self, packet)
+    fn wants(&mut self, packet: &Placed, meets: &dyn Fn(Arc) -> bool) -> bool {
+        SweepCutter::is_wanted(self, packet, meets)
     }
 
     fn skip(&mut self, packet: &Placed) {

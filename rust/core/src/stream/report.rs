@@ -229,6 +229,12 @@ impl ScanReport {
 }
 
 impl StreamInfo {
+    /// About how many points it has in a stretch of time, if they are spread evenly.
+    pub fn points_within(&self, length_ns: i64) -> f64 {
+        let whole_ns = (self.last - self.first).max(1) as f64;
+        self.points as f64 * (length_ns as f64 / whole_ns).clamp(0.0, 1.0)
+    }
+
     fn is_splittable(&self) -> bool {
         let busy = self
             .source_ports

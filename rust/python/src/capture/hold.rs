@@ -18,15 +18,17 @@ type Columns<'py> = (
     Bound<'py, PyArray1<f32>>,
 );
 
-/// Gathers the echoes of lidars, by their numbers, from packets in [`start_ns`, `stop_ns`).
+/// Gathers the echoes of lidars, by their numbers, from packets in [`start_ns`, `stop_ns`); intensities are
+/// empty where they are not asked for.
 #[pyfunction]
-#[pyo3(signature = (scan, *, lidars, start_ns, stop_ns, threads=None))]
+#[pyo3(signature = (scan, *, lidars, start_ns, stop_ns, with_intensity=true, threads=None))]
 pub fn hold_echoes<'py>(
     py: Python<'py>,
     scan: &CaptureScan,
     lidars: Vec<usize>,
     start_ns: i64,
     stop_ns: i64,
+    with_intensity: bool,
     threads: Option<usize>,
 ) -> BorderResult<Vec<Columns<'py>>> {
     let (start, stop) = (Timestamp(start_ns), Timestamp(stop_ns));
@@ -37,7 +39,7 @@ pub fn hold_echoes<'py>(
             ..SweepOptions::of(&[*number], &[0.0])
         };
         let info = scan.report.lidars.get(*number);
-        let echoes = info.map(|info| HoldEchoes::of(info, start, stop));
+        let echoes = info.map(|info| HoldEchoes::of(info, start, stop, with_intensity));
         (options, echoes.unwrap_or_default())
     };
     let beside = Beside::new(&scan.report, lidars.iter().map(lidar))?;

@@ -21,9 +21,12 @@ use crate::error::BorderResult;
 /// Which frames to make of which capture.
 #[pyclass(frozen, module = "lidar_deflect._native")]
 pub struct FramePlan {
-    paths: Vec<PathBuf>,
-    report: Arc<ScanReport>,
-    plan: reader::FramePlan,
+    /// Files of the capture.
+    pub paths: Vec<PathBuf>,
+    /// What is known of it.
+    pub report: Arc<ScanReport>,
+    /// The frames.
+    pub plan: reader::FramePlan,
 }
 
 #[pymethods]

@@ -165,9 +165,12 @@ impl Lanes {
         out.encoder_rad.extend_from_slice(&placed.encoder_rad);
         cloud.xyz_m.extend_from_slice(&placed.xyz_m);
         cloud.time_ns.extend_from_slice(&placed.time_ns);
-        cloud.range_m.extend_from_slice(&placed.range_m);
         cloud.azimuth_rad.extend_from_slice(&placed.azimuth_rad);
         cloud.ring.extend_from_slice(&self.ring);
+        if out.is_slim {
+            return;
+        }
+        cloud.range_m.extend_from_slice(&placed.range_m);
         cloud.intensity.extend_from_slice(&placed.intensity);
         let len = cloud.xyz_m.len();
         cloud.return_index.resize(len, 0);
@@ -179,6 +182,23 @@ impl Lanes {
     /// Appends the hits of a row; `placed` has the shots of each of its blocks.
     fn keep(&self, hits: &[Hit], row: Row, placed: &[Placed], out: &mut Decoded) {
         let cloud = &mut out.cloud;
+        let shots = || {
+            hits.iter()
+                .map(|hit| (&placed[usize::from(hit.place)], hit.shot()))
+        };
+        out.encoder_rad
+            .extend(shots().map(|(p, k)| p.encoder_rad[k]));
+        cloud.xyz_m.extend(shots().map(|(p, k)| p.xyz_m[k]));
+        cloud.time_ns.extend(shots().map(|(p, k)| p.time_ns[k]));
+        cloud
+            .azimuth_rad
+            .extend(shots().map(|(p, k)| p.azimuth_rad[k]));
+        cloud.ring.extend(shots().map(|(_, k)| self.ring[k]));
+        if out.is_slim {
+            return;
+        }
+        cloud.range_m.extend(shots().map(|(p, k)| p.range_m[k]));
+        cloud.intensity.extend(shots().map(|(p, k)| p.intensity[k]));
         cloud.return_index.extend(hits.iter().map(|hit| hit.place));
         cloud
             .return_kind
@@ -188,20 +208,6 @@ impl Lanes {
         cloud
             .packet
             .resize(cloud.packet.len() + hits.len(), row.packet);
-        let hits = || {
-            hits.iter()
-                .map(|hit| (&placed[usize::from(hit.place)], hit.shot()))
-        };
-        out.encoder_rad
-            .extend(hits().map(|(p, k)| p.encoder_rad[k]));
-        cloud.xyz_m.extend(hits().map(|(p, k)| p.xyz_m[k]));
-        cloud.time_ns.extend(hits().map(|(p, k)| p.time_ns[k]));
-        cloud.range_m.extend(hits().map(|(p, k)| p.range_m[k]));
-        cloud
-            .azimuth_rad
-            .extend(hits().map(|(p, k)| p.azimuth_rad[k]));
-        cloud.ring.extend(hits().map(|(_, k)| self.ring[k]));
-        cloud.intensity.extend(hits().map(|(p, k)| p.intensity[k]));
     }
 }
 
