@@ -24,9 +24,9 @@ impl Adjustment {
     pub(super) fn seek(&mut self, gates: &Gates) -> Result<Step, BeamError> {
         let all = self.free.clone();
         // What the stage holds would only make its equations larger.
-        self.free.end = self.open_until(gates.stage).min(all.end);
+        self.solve_for(all.start..self.open_until(gates.stage).min(all.end));
         let step = self.sought(gates);
-        self.free = all;
+        self.solve_for(all);
         step
     }
 
@@ -128,7 +128,8 @@ impl Rows<'_> {
         let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / variance;
         let time_ns = self.time_ns(echo.lidar, echo.time_ns);
         let moves = self.fill_row(&near.contact, &near.towards, echo.lidar, time_ns);
-        self.add_row(&near.contact, moves, near.off_m, weight);
+        self.fill_surface(&near.contact, &near.towards);
+        self.add_row(&near.contact, (&near.towards, moves), near.off_m, weight);
     }
 }
 

@@ -24,13 +24,13 @@ impl Adjustment {
     }
 
     fn smooth_at(&self, prior: &mut Normal, knot: usize, weight: f64) {
-        let at = knot - prior.free.start;
+        let (row, column) = (knot - prior.asked.start, knot - prior.free.start);
         let values = self.values.rows(knot, FOURTH.len());
         let difference: f64 = FOURTH.iter().zip(&values).map(|(c, value)| c * value).sum();
         for (i, one) in FOURTH.iter().enumerate() {
-            prior.right[at + i] -= weight * one * difference;
+            prior.right[row + i] -= weight * one * difference;
             for (j, other) in FOURTH.iter().enumerate().take(i + 1) {
-                prior.matrix[(at + i, at + j)] += weight * one * other;
+                prior.matrix[(row + i, column + j)] += weight * one * other;
             }
         }
     }
@@ -56,7 +56,7 @@ mod tests {
         let knots = part.layout.knots[0];
         let first = part.layout.sway_at(0) + knots;
         (0..knots).for_each(|k| part.values[first + k] = of(k));
-        let mut prior = Normal::new(part.free.clone());
+        let mut prior = Normal::new(&part.free, &part.free);
         part.smooth(&mut prior);
         let at = first - prior.free.start;
         prior.right.rows(at, knots).iter().copied().collect()
