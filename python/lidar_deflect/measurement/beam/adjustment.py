@@ -100,6 +100,7 @@ def reading(inputs: Inputs, plan: Plan, windows_ns: Sequence[tuple[int, int]]) -
         box_m=np.ascontiguousarray(plan.box_m),
         windows_ns=list(windows_ns),
         moves=inputs.native_moves,
+        threads=inputs.threads,
     )
 
 
