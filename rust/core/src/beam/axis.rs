@@ -58,8 +58,10 @@ impl Axis {
     /// What a change of curvature (each element, its own directions) and of the root's rotation
     /// (world) moves.
     pub fn field(&self, s_m: &[f64], change: &[Vector3<f64>], root_turn: &Vector3<f64>) -> Field {
-        let mut turn = vec![*root_turn];
-        let mut place = vec![Vector3::zeros()];
+        let mut turn = Vec::with_capacity(s_m.len());
+        let mut place = Vec::with_capacity(s_m.len());
+        turn.push(*root_turn);
+        place.push(Vector3::zeros());
         for (i, bend) in change.iter().enumerate() {
             let length = s_m[i + 1] - s_m[i];
             let middle = 0.5 * (self.turn[i] + self.turn[i + 1]);

@@ -22,7 +22,9 @@ pub(super) const MIXED_ECHOES: u32 = 2;
 const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
 
 /// So many echoes and edges bring the blade to where all of them can take it in one step: the gate is still wide.
-const WIDE: (usize, usize) = (3000, 1000);
+const WIDE: (usize, usize) = (1500, 500);
+/// The same of a stretch, of which less is unknown.
+const WIDE_STRETCH: (usize, usize) = (600, 250);
 
 /// At most so many echoes, evenly.
 pub(super) fn some(all: &[Echo], most: usize) -> impl Iterator<Item = &Echo> {
@@ -171,9 +173,13 @@ impl<'a> Rows<'a> {
         let adjustment = self.adjustment;
         let most = adjustment.weights.echoes;
         let is_held_back = adjustment.is_vague() && !adjustment.follows_load;
+        let wide = match adjustment.follows_load {
+            true => WIDE_STRETCH,
+            false => WIDE,
+        };
         match self.gates.is_fine() || is_held_back {
             true => (most, usize::MAX),
-            false => (most.min(WIDE.0), WIDE.1),
+            false => (most.min(wide.0), wide.1),
         }
     }
 

@@ -11,10 +11,13 @@ use super::step::Step;
 use super::weights::{Tally, robust};
 use crate::error::BeamError;
 
-/// So many echoes of a hold suffice, and so many edges; so many echoes tell as much as one.
-const OF_BLADE: (usize, f64) = (2000, 1.0);
-/// The same where the surface is learned: neighbours are off alike while it is not known.
-const OF_SURFACE: (usize, f64) = (8000, 3.0);
+/// So many echoes and edges of a hold bring a blade that has a drawing near.
+const DRAWN: (usize, usize) = (600, 400);
+/// The same where no drawing tells how it is bent ...
+const UNDRAWN: (usize, usize) = (2000, 2000);
+/// ... and where its surface is learned; so many echoes then tell as much as one, for neighbours are off alike.
+const OF_SURFACE: (usize, usize) = (8000, 8000);
+const ALIKE: f64 = 3.0;
 /// A step that does no good is shortened to this share, at most so often.
 const SHORTENED: (f64, usize) = (0.4, 6);
 
@@ -81,14 +84,15 @@ impl Rows<'_> {
     /// Looks at the data by distances of points.
     pub(super) fn look_near(&mut self) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let (enough, alike) = match self.gates.stage {
-            Stage::Surface => OF_SURFACE,
-            _ => OF_BLADE,
+        let ((echoes, edges), alike) = match self.gates.stage {
+            Stage::Surface => (OF_SURFACE, ALIKE),
+            _ if self.adjustment.is_vague() => (UNDRAWN, 1.0),
+            _ => (DRAWN, 1.0),
         };
-        for echo in some(&seen.echoes, enough) {
+        for echo in some(&seen.echoes, echoes) {
             self.add_point(echo, alike);
         }
-        for edge in some_edges(&seen.edges, enough) {
+        for edge in some_edges(&seen.edges, edges) {
             self.add_edge(edge);
         }
     }

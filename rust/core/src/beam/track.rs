@@ -22,8 +22,8 @@ const KNOT_NS: i64 = 50_000_000;
 /// Standard deviation of the load against its channel, share of full load.
 const LOAD_SHARE: f64 = 0.02;
 /// At most so many echoes of a stretch are used: what the holds told of lidars and surface leaves more unsure
-/// than their noise.
-const ECHOES: usize = 8000;
+/// than their noise. Its edges are few, and all of them are.
+const ECHOES: usize = 4000;
 /// Weight of what the holds on both sides tell of a state's own unknowns: it is known to a fifth.
 const OWN_TIGHTNESS: f64 = 25.0;
 
