@@ -9,18 +9,18 @@ use lidar_deflect_core::beam::carry::Knowledge;
 use lidar_deflect_core::beam::design::{self, Design, Outlines};
 use lidar_deflect_core::beam::echoes::Seen;
 use lidar_deflect_core::beam::family::{Loading, Trust};
-use lidar_deflect_core::beam::gather::Gather;
+use lidar_deflect_core::beam::gather::{Gather, GatherPlan};
 use lidar_deflect_core::beam::layout::RIG;
 use lidar_deflect_core::beam::mesh::Mesh;
 use lidar_deflect_core::beam::rig::Rig;
 use lidar_deflect_core::beam::shape::{Shape, ShapeTrust};
 use lidar_deflect_core::beam::track::{Followed, Stretch, load_knots};
 use lidar_deflect_core::beam::weights::Weights;
-use lidar_deflect_core::capture::DatagramReader;
+use lidar_deflect_core::capture::{DatagramBatch, DatagramReader};
 use lidar_deflect_core::frame::WorldFromSensor;
 use lidar_deflect_core::paper::passthrough::PassThrough;
 use lidar_deflect_core::stand::Stands;
-use lidar_deflect_core::stream::{ScanReport, SweepOptions, SweepReader};
+use lidar_deflect_core::stream::{Reading, ScanReport};
 use lidar_deflect_core::synthetic::blade::Blade;
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::hint::black_box;
@@ -37,6 +37,8 @@ const FULL_N: f64 = 3e4;
 /// Both holds, and what is between them, milliseconds since the start.
 const HOLDS_MS: [(i64, i64); 2] = [(100, 900), (2100, 2900)];
 const STRETCH_MS: (i64, i64) = (1000, 2000);
+/// Bytes of datagrams that lidars look at side by side.
+const BATCH_BYTES: usize = 1 << 19;
 /// Sections whose states are wanted, metres.
 const SECTIONS_M: [f64; 3] = [84.0, 100.0, 110.0];
 
@@ -54,30 +56,27 @@ fn span_ns((from_ms, to_ms): (i64, i64)) -> (i64, i64) {
 
 /// What is seen of the blade in the holds and, in the middle, between them.
 fn gathered(bytes: &[u8], report: &ScanReport, poses: &[WorldFromSensor]) -> Vec<Arc<Seen>> {
-    let pass = PassThrough::new([-6.0, -5.0, 60.0], [12.0, 6.0, 112.0]).unwrap();
     let lidars: Vec<usize> = (0..poses.len()).collect();
-    let stands = Stands::of(poses, &[]).unwrap();
-    let bearings = stands.iter().map(|own| pass.bearings(own));
-    let options = SweepOptions::of(&lidars, &vec![0.0; lidars.len()]).towards(&lidars, bearings);
-    let mut reader = SweepReader::new(report, &options).unwrap();
+    let plan = GatherPlan {
+        lidars: &lidars,
+        cuts_rad: &vec![0.0; lidars.len()],
+        stands: Stands::of(poses, &[]).unwrap(),
+        pass: PassThrough::new([-6.0, -5.0, 60.0], [12.0, 6.0, 112.0]).unwrap(),
+    };
     let windows = [HOLDS_MS[0], STRETCH_MS, HOLDS_MS[1]].map(span_ns);
-    let mut gather = Gather::new(stands, pass, &windows);
+    let mut gather = Gather::new(report, plan, &windows).unwrap();
+    let mut batch = DatagramBatch::default();
     let mut datagrams = DatagramReader::new(bytes).unwrap();
     while let Some(datagram) = datagrams.next().unwrap() {
-        reader.push(&datagram);
-        hand_over(&mut reader, &mut gather);
+        batch.push(&datagram);
+        if batch.bytes() > BATCH_BYTES {
+            gather.push(&batch);
+            batch.clear();
+        }
     }
-    reader.finish();
-    hand_over(&mut reader, &mut gather);
+    gather.push(&batch);
     gather.finish();
     std::iter::from_fn(|| gather.pop()).map(Arc::new).collect()
-}
-
-fn hand_over(reader: &mut SweepReader, gather: &mut Gather) {
-    while let Some(sweep) = reader.pop() {
-        gather.push(&sweep);
-        reader.recycle(sweep.lidar, sweep.cloud);
-    }
 }
 
 /// The drawing of the simulated blade.

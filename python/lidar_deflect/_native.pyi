@@ -501,6 +501,7 @@ class BeamFeed:
         box_m: NDArray[np.float64],
         windows_ns: Sequence[tuple[int, int]],
         moves: Sequence[tuple[int, int, int, list[list[float]]]] = ...,
+        threads: int | None = None,
     ) -> BeamFeed: ...
     def take(
         self, count: int, progress: Callable[[int, int], None] | None = None

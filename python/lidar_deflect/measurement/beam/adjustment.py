@@ -36,8 +36,9 @@ LONGEST_NS = 6_000_000_000
 """More of a hold adds time, not accuracy."""
 SEEN_SHARE = 0.45
 """The surface is free to differ from the drawing outboard of this share of the length."""
-ECHOES = 20_000
-"""Echoes of a hold that are used, evenly thinned."""
+ECHOES, ECHOES_GENERIC = 8_000, 20_000
+"""Echoes of a hold that are used, evenly thinned, with a drawing and without: what they have in
+common, surface and range errors, does not shrink with their number as their noise does."""
 
 NOISE_M, SURFACE_M, EDGE_RAD = 0.015, 0.002, 1e-4
 
@@ -100,6 +101,7 @@ def reading(inputs: Inputs, plan: Plan, windows_ns: Sequence[tuple[int, int]]) -
         box_m=np.ascontiguousarray(plan.box_m),
         windows_ns=list(windows_ns),
         moves=inputs.native_moves,
+        threads=inputs.threads,
     )
 
 
@@ -181,7 +183,7 @@ def _started(
         noise_m=NOISE_M,
         surface_m=SURFACE_M,
         edge_rad=EDGE_RAD,
-        echoes=ECHOES,
+        echoes=ECHOES_GENERIC if drawing.source == "generic" else ECHOES,
         threads=inputs.threads,
     )
 

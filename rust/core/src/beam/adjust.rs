@@ -129,6 +129,8 @@ pub struct Adjustment {
     pub weights: Weights,
     /// Which unknowns are solved for.
     pub free: Range<usize>,
+    /// Of which unknowns normal equations have rows: those solved for among them.
+    pub(super) asked: Range<usize>,
     /// Standard deviation of each mode in time, in its own unit.
     pub modes_m: Vec<f64>,
     /// Expected values before the data, in standard deviations, and their weights.
@@ -178,6 +180,7 @@ impl Adjustment {
             expected: DVector::zeros(layout.len()),
             tightness: DVector::repeat(layout.len(), 1.0),
             free: 0..layout.len(),
+            asked: 0..layout.len(),
             modes_m: SWAY_M.to_vec(),
             knot_ns: KNOT_NS,
             follows_load: false,
@@ -304,6 +307,7 @@ impl Adjustment {
             layout,
             rig: self.rig.clone(),
             free: self.free.clone(),
+            asked: self.asked.clone(),
             modes_m: self.modes_m.clone(),
             muted: self.muted.clone(),
             clocks: None,
@@ -323,6 +327,12 @@ impl Adjustment {
             self.values[unknown] += change;
             self.build();
         }
+    }
+
+    /// Solves for these unknowns from now on, and asks for no others.
+    pub(super) fn solve_for(&mut self, unknowns: Range<usize>) {
+        self.asked = unknowns.clone();
+        self.free = unknowns;
     }
 
     /// Where the adjustment stands, to come back to.

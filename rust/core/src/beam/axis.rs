@@ -2,6 +2,9 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
+/// Below this angle the fifth terms of the series of sine and cosine are less than rounding, rad.
+const SMALL_RAD: f64 = 0.1;
+
 /// Directions and place of all nodes at one instant.
 #[derive(Debug, Clone)]
 pub struct Axis {
@@ -31,13 +34,13 @@ impl Axis {
         place.push(Vector3::zeros());
         for (i, bend) in curvature.iter().enumerate() {
             let length = s_m[i + 1] - s_m[i];
-            let half = Rotation3::from_scaled_axis(bend * (0.5 * length));
-            let middle = turn[i] * half.matrix();
+            let half = rotation(&(bend * (0.5 * length)));
+            let middle = turn[i] * half;
             // The chord of an arc is shorter than the arc.
             let across = bend.xy().norm() * length;
             let chord = length * (1.0 - across * across / 24.0);
             place.push(place[i] + middle.column(2) * chord);
-            turn.push(middle * half.matrix());
+            turn.push(middle * half);
         }
         Self {
             turn,
@@ -55,8 +58,10 @@ impl Axis {
     /// What a change of curvature (each element, its own directions) and of the root's rotation
     /// (world) moves.
     pub fn field(&self, s_m: &[f64], change: &[Vector3<f64>], root_turn: &Vector3<f64>) -> Field {
-        let mut turn = vec![*root_turn];
-        let mut place = vec![Vector3::zeros()];
+        let mut turn = Vec::with_capacity(s_m.len());
+        let mut place = Vec::with_capacity(s_m.len());
+        turn.push(*root_turn);
+        place.push(Vector3::zeros());
         for (i, bend) in change.iter().enumerate() {
             let length = s_m[i + 1] - s_m[i];
             let middle = 0.5 * (self.turn[i] + self.turn[i + 1]);
@@ -69,6 +74,21 @@ impl Axis {
         }
         Field { turn, place }
     }
+}
+
+/// Rotation by a rotation vector: most are so small that a few terms of the series are exact.
+fn rotation(turn: &Vector3<f64>) -> Matrix3<f64> {
+    let square = turn.norm_squared();
+    if square > SMALL_RAD * SMALL_RAD {
+        return Rotation3::from_scaled_axis(*turn).into_inner();
+    }
+    // sin(a) / a and (1 - cos(a)) / a^2.
+    let along =
+        1.0 - square / 6.0 * (1.0 - square / 20.0 * (1.0 - square / 42.0 * (1.0 - square / 72.0)));
+    let twice =
+        0.5 - square / 24.0 * (1.0 - square / 30.0 * (1.0 - square / 56.0 * (1.0 - square / 90.0)));
+    let cross = turn.cross_matrix();
+    Matrix3::identity() + cross * along + cross * cross * twice
 }
 
 impl Field {

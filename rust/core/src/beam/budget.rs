@@ -157,7 +157,7 @@ impl Adjustment {
             .into_par_iter()
             .map(of)
             .collect();
-        let mut sum = Normal::new(self.free.clone());
+        let mut sum = Normal::new(&self.free, &self.free);
         parts.iter().for_each(|part| sum.join(part));
         sum
     }

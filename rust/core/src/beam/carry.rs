@@ -173,7 +173,7 @@ impl Adjustment {
     ) -> Vec<Spread> {
         let (first, count) = (stretch.free.start, stretch.free.len());
         let answer = factor.solve(&rows.rows(first, count).into_owned());
-        let held = rows - normal.columns(first, count) * &answer;
+        let held = rows - normal * &answer;
         let mut parent = DMatrix::zeros(self.layout.len(), rows.ncols());
         let mut add = |to: usize, weight: f64, row: nalgebra::RowDVector<f64>| {
             let mut at = parent.row_mut(to);
@@ -287,7 +287,8 @@ mod tests {
         for _ in 0..3 {
             part.step(&GATES).unwrap();
         }
-        let (normal, _) = part.last_step(&GATES, 0..part.layout.len()).unwrap();
+        part.asked = 0..part.layout.len();
+        let (normal, _) = part.last_step(&GATES).unwrap();
         let factor = part.free_factor(&normal).unwrap();
         let (_, rows) = part.states_at(&knowledge.rests, &part.posed(0), 0, TIME_NS);
         let between = stretch.between(&[1.0]);

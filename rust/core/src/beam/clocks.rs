@@ -52,10 +52,10 @@ impl Adjustment {
         let lacking: f64 = (0..count)
             .map(|i| weights[i] * (self.expected[first + i] - self.values[first + i]))
             .sum();
-        let at = first - self.free.start;
-        let mut right = prior.right.rows_mut(at, count);
+        let (row, column) = (first - prior.asked.start, first - prior.free.start);
+        let mut right = prior.right.rows_mut(row, count);
         right += &weights * (TIED * lacking);
-        let mut block = prior.matrix.view_mut((at, at), (count, count));
+        let mut block = prior.matrix.view_mut((row, column), (count, count));
         block += &weights * weights.transpose() * TIED;
     }
 
@@ -65,7 +65,7 @@ impl Adjustment {
         let at = first - self.free.start;
         let block = known.view((at, at), (count, count)).into_owned();
         let information = block.try_inverse()?;
-        let mut prior = Normal::new(self.free.clone());
+        let mut prior = Normal::new(&self.free, &self.free);
         self.tie_clocks(&mut prior);
         let before = prior.matrix.view((at, at), (count, count)) + DMatrix::identity(count, count);
         let right = &information * self.values.rows(first, count)

@@ -123,7 +123,8 @@ mod tests {
             for _ in 0..8 {
                 let tallies = adjustment.descend(&gates).unwrap().tallies;
                 let cost = adjustment.cost(&gates, &tallies);
-                assert!(cost < last * (1.0 + 1e-9), "{cost} after {last}");
+                // What was known before is told of the end of a step, the data of its start.
+                assert!(cost < last * (1.0 + 1e-6), "{cost} after {last}");
                 last = cost;
             }
         }

@@ -46,6 +46,12 @@ pub struct Seen {
 }
 
 impl Seen {
+    /// Adds what another lidar saw.
+    pub fn append(&mut self, other: Self) {
+        self.echoes.extend(other.echoes);
+        self.edges.extend(other.edges);
+    }
+
     /// Brings what a beam saw in one sweep after the other together, and the ends of each side: they meet the same
     /// part of the blade, and sums over it stay where they are at hand.
     pub fn sort(&mut self) {

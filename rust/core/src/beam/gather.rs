@@ -5,22 +5,50 @@ use std::collections::VecDeque;
 use nalgebra::{Point3, Vector3};
 
 use super::echoes::{LineEcho, Seen, add_line};
+use crate::capture::DatagramBatch;
+use crate::cloud::PointCloud;
+use crate::error::ReadError;
+use crate::frame::Sensor;
 use crate::paper::passthrough::PassThrough;
 use crate::stand::{Stand, Stands};
+use crate::stream::{Beside, Reading, ScanReport, SweepOptions, Taker};
 use crate::sweep::{Gap, Sweep};
+use crate::time::Timestamp;
 
 /// A window no longer waits for a lidar that is so far behind the others: it has fallen silent.
 const PATIENCE_NS: i64 = 60_000_000_000;
 
-/// Collects what is seen of the blade in given stretches of time, each handed over when it is complete.
-#[derive(Debug)]
+/// Collects what is seen of the blade in given stretches of time, each handed over when it is complete; lidars side
+/// by side.
 pub struct Gather {
-    stands: Vec<Stands>,
+    lidars: Beside<Windows>,
+    /// Of the windows that were not handed over yet.
+    ends_ns: VecDeque<i64>,
+    has_ended: bool,
+}
+
+/// Which lidars are read, by number in the scan, at which azimuth their sweeps are cut, where they stand, and what
+/// lies around the blade.
+#[derive(Debug)]
+pub struct GatherPlan<'a> {
+    /// Numbers.
+    pub lidars: &'a [usize],
+    /// Azimuths.
+    pub cuts_rad: &'a [f64],
+    /// What is seen goes by number of the stand.
+    pub stands: Vec<Stands>,
+    /// Points inside of it count.
+    pub pass: PassThrough,
+}
+
+/// What one lidar sees in the windows.
+#[derive(Debug)]
+struct Windows {
+    stands: Stands,
     pass: PassThrough,
     open: VecDeque<Window>,
-    /// Start of the last sweep of each lidar.
-    reached_ns: Vec<i64>,
-    has_ended: bool,
+    /// Start of the last sweep.
+    reached_ns: i64,
 }
 
 #[derive(Debug)]
@@ -30,24 +58,89 @@ struct Window {
 }
 
 impl Gather {
-    /// For lidars that stand there, points inside the box, and windows in the order of their starts.
-    pub fn new(stands: Vec<Stands>, pass: PassThrough, windows_ns: &[(i64, i64)]) -> Self {
+    /// For the capture that `report` was made of, with windows in the order of their starts.
+    ///
+    /// # Errors
+    /// [`ReadError`] where a lidar cannot be decoded.
+    pub fn new(
+        report: &ScanReport,
+        plan: GatherPlan<'_>,
+        windows_ns: &[(i64, i64)],
+    ) -> Result<Self, ReadError> {
+        let lidars = plan.lidars.iter().zip(plan.cuts_rad);
+        let lidar = |((number, cut_rad), stands): ((&usize, &f64), Stands)| {
+            let bearings = std::iter::once(plan.pass.bearings(&stands));
+            let options = SweepOptions {
+                start: windows_ns.iter().map(|w| Timestamp(w.0)).min(),
+                stop: windows_ns.iter().map(|w| Timestamp(w.1)).max(),
+                ..SweepOptions::of(&[*number], &[*cut_rad]).towards(&[*number], bearings)
+            };
+            (options, Windows::new(stands, plan.pass, windows_ns))
+        };
+        Ok(Self {
+            lidars: Beside::new(report, lidars.zip(plan.stands).map(lidar))?,
+            ends_ns: windows_ns.iter().map(|span_ns| span_ns.1).collect(),
+            has_ended: false,
+        })
+    }
+
+    /// What was seen in the next window, once no lidar has more to say of it.
+    pub fn pop(&mut self) -> Option<Seen> {
+        let end_ns = *self.ends_ns.front()?;
+        if !self.has_ended && !self.is_past(end_ns) {
+            return None;
+        }
+        self.ends_ns.pop_front();
+        let mut seen = Seen::default();
+        let of_lidars = self.lidars.takers();
+        of_lidars
+            .filter_map(|lidar| lidar.open.pop_front())
+            .for_each(|window| seen.append(window.seen));
+        seen.sort();
+        Some(seen)
+    }
+
+    fn is_past(&mut self, end_ns: i64) -> bool {
+        let reached_ns = self.lidars.takers().map(|lidar| lidar.reached_ns);
+        is_past(end_ns, reached_ns)
+    }
+}
+
+impl Reading for Gather {
+    fn push(&mut self, batch: &DatagramBatch) {
+        self.lidars.push(batch);
+    }
+
+    fn is_done(&self) -> bool {
+        self.lidars.is_done()
+    }
+
+    fn finish(&mut self) {
+        self.lidars.finish();
+        self.has_ended = true;
+    }
+}
+
+impl Windows {
+    fn new(stands: Stands, pass: PassThrough, windows_ns: &[(i64, i64)]) -> Self {
         let window = |span_ns: &(i64, i64)| Window {
             span_ns: *span_ns,
             seen: Seen::default(),
         };
         Self {
-            reached_ns: vec![i64::MIN; stands.len()],
             stands,
             pass,
             open: windows_ns.iter().map(window).collect(),
-            has_ended: false,
+            reached_ns: i64::MIN,
         }
     }
+}
 
-    /// Takes the next sweep of a lidar by its number among the stands; what is seen goes by number of the stand.
-    pub fn push(&mut self, sweep: &Sweep) {
-        self.reached_ns[sweep.lidar] = sweep.start.0;
+impl Taker for Windows {
+    type Kept = PointCloud<Sensor>;
+
+    fn take(&mut self, sweep: &Sweep) {
+        self.reached_ns = sweep.start.0;
         for window in &mut self.open {
             if window.span_ns.0 > sweep.end.0 {
                 break; // so do all that follow
@@ -55,7 +148,7 @@ impl Gather {
             if sweep.start.0 > window.span_ns.1 {
                 continue;
             }
-            let stands = &self.stands[sweep.lidar];
+            let stands = &self.stands;
             let is_gap = |from: i64, to: i64| {
                 let lost = |gap: &Gap| gap.from.0 <= to && from <= gap.to.0;
                 sweep.gaps.iter().any(lost) || stands.moves_within(from, to)
@@ -69,27 +162,14 @@ impl Gather {
             }
         }
     }
+}
 
-    /// No more sweeps will come.
-    pub fn finish(&mut self) {
-        self.has_ended = true;
-    }
-
-    /// What was seen in the next window, once no lidar has more to say of it.
-    pub fn pop(&mut self) -> Option<Seen> {
-        let end_ns = self.open.front()?.span_ns.1;
-        let slowest = self.reached_ns.iter().min()?;
-        let fastest = self.reached_ns.iter().max()?;
-        let is_past = *slowest > end_ns || *fastest > end_ns.saturating_add(PATIENCE_NS);
-        (is_past || self.has_ended)
-            .then(|| self.open.pop_front())
-            .flatten()
-            .map(|window| {
-                let mut seen = window.seen;
-                seen.sort();
-                seen
-            })
-    }
+/// Whether no lidar has more to say of a window with this end, by the starts of their last sweeps.
+fn is_past(end_ns: i64, reached_ns: impl Iterator<Item = i64>) -> bool {
+    let (slowest, fastest) = reached_ns.fold((i64::MAX, i64::MIN), |(slow, fast), reached| {
+        (slow.min(reached), fast.max(reached))
+    });
+    slowest > end_ns || fastest > end_ns.saturating_add(PATIENCE_NS)
 }
 
 /// Echoes of a sweep inside the box, the window and a stand, by beam, in the order of the shots.
@@ -147,52 +227,23 @@ fn shot_period_ns(line: &[LineEcho]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::PointCloud;
-    use crate::frame::WorldFromSensor;
-    use crate::time::Timestamp;
-    use nalgebra::Rotation3;
 
     const SECOND: i64 = 1_000_000_000;
 
-    fn gather(windows: &[(i64, i64)]) -> Gather {
-        let pose = WorldFromSensor::new(Rotation3::identity(), Vector3::zeros());
-        let stands = Stands::of(&[pose; 2], &[]).unwrap();
-        let pass = PassThrough::new([-1.0; 3], [1.0; 3]).unwrap();
-        Gather::new(stands, pass, windows)
-    }
-
-    fn sweep(lidar: usize, start: i64) -> Sweep {
-        Sweep {
-            lidar,
-            index: 0,
-            cloud: PointCloud::default(),
-            start: Timestamp(start),
-            end: Timestamp(start + 100),
-            coverage: 1.0,
-            packets: 1,
-            lost: 0,
-            gaps: Vec::new(),
-        }
-    }
-
     #[test]
     fn a_window_waits_until_all_lidars_are_past_it() {
-        let mut gather = gather(&[(0, 1000), (500, 2000)]);
-        gather.push(&sweep(0, 1500));
-        assert!(gather.pop().is_none());
-        gather.push(&sweep(1, 1001));
-        assert!(gather.pop().is_some());
-        assert!(gather.pop().is_none());
-        gather.finish();
-        assert!(gather.pop().is_some() && gather.pop().is_none());
+        assert!(!is_past(1000, [1500, i64::MIN].into_iter()));
+        assert!(!is_past(1000, [1500, 1000].into_iter()));
+        assert!(is_past(1000, [1500, 1001].into_iter()));
+        assert!(!is_past(2000, [1500, 1001].into_iter()));
     }
 
     #[test]
     fn a_silent_lidar_does_not_hold_up_the_others_for_ever() {
-        let mut gather = gather(&[(0, SECOND)]);
-        gather.push(&sweep(0, 2 * SECOND));
-        assert!(gather.pop().is_none());
-        gather.push(&sweep(0, 2 * SECOND + PATIENCE_NS));
-        assert!(gather.pop().is_some());
+        assert!(!is_past(SECOND, [i64::MIN, 2 * SECOND].into_iter()));
+        assert!(is_past(
+            SECOND,
+            [i64::MIN, 2 * SECOND + PATIENCE_NS].into_iter()
+        ));
     }
 }

@@ -42,15 +42,17 @@ impl Panel {
         self.rows.resize(whole, 0.0);
     }
 
-    /// Sums of products of columns over all rows, a line per column: right of the diagonal only.
-    pub fn multiply(&mut self) -> impl Iterator<Item = &[f64]> {
+    /// Sums of products of columns over all rows, a line for each of the first `count` columns: right of the
+    /// diagonal only.
+    pub fn multiply(&mut self, count: usize) -> impl Iterator<Item = &[f64]> {
         self.products.resize(self.width * self.width, 0.0);
         vectorized(Squares {
             rows: &self.rows,
             width: self.width,
+            count,
             products: &mut self.products,
         });
-        self.products.chunks_exact(self.width.max(1))
+        self.products.chunks_exact(self.width.max(1)).take(count)
     }
 
     /// Whether it has no row.
@@ -62,6 +64,7 @@ impl Panel {
 struct Squares<'a> {
     rows: &'a [f64],
     width: usize,
+    count: usize,
     products: &'a mut [f64],
 }
 
@@ -70,7 +73,7 @@ impl Kernel for Squares<'_> {
 
     #[inline(always)]
     fn run(self) {
-        for a in (0..self.width).step_by(BLOCK) {
+        for a in (0..self.count).step_by(BLOCK) {
             for b in (a..self.width).step_by(BLOCK) {
                 let block = product(self.rows, self.width, a, b);
                 for (i, sums) in block.iter().enumerate() {
@@ -114,7 +117,7 @@ mod tests {
         let row = |k: usize| (0..7).map(move |i| ((k * 7 + i) as f64 * 0.7).sin());
         (0..20).for_each(|k| panel.push(row(k), 2.0));
         assert!(panel.suits(3, &places) && !panel.suits(3, &places[1..]));
-        for (i, line) in panel.multiply().take(7).enumerate() {
+        for (i, line) in panel.multiply(7).enumerate() {
             for (j, found) in line.iter().enumerate().take(7).skip(i) {
                 let at = |k: usize, column: usize| row(k).nth(column).unwrap();
                 let sum: f64 = (0..20).map(|k| 4.0 * at(k, i) * at(k, j)).sum();

@@ -133,9 +133,14 @@ impl Posed {
     /// per unknown.
     pub fn moves(&self, places: &[usize]) -> DMatrix<f64> {
         let nodes = self.moves.len() / self.unknowns;
-        DMatrix::from_fn(MOVES * nodes, places.len(), |i, j| {
-            self.moves[i / MOVES * self.unknowns + places[j]][i % MOVES]
-        })
+        let mut moves = DMatrix::zeros(MOVES * nodes, places.len());
+        for (node, of_node) in self.moves.chunks_exact(self.unknowns).enumerate() {
+            for (column, place) in places.iter().enumerate() {
+                let mut at = moves.fixed_view_mut::<MOVES, 1>(MOVES * node, column);
+                at.copy_from_slice(&of_node[*place]);
+            }
+        }
+        moves
     }
 
     /// Coefficients of the sway per mode.

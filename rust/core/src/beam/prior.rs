@@ -104,25 +104,25 @@ impl Adjustment {
 
     /// What is known before the data.
     pub(super) fn prior(&self, stage: Stage) -> Normal {
-        let mut prior = Normal::new(self.free.clone());
+        let mut prior = Normal::new(&self.asked, &self.free);
+        let (asked, free) = (self.asked.start, self.free.start);
         let (rig, count) = (self.layout.lidar_at(0), self.layout.rig_len());
-        for (place, i) in self.free.clone().enumerate() {
+        for i in self.free.clone() {
             let is_held = self.needs(i) > stage;
             let tight = if is_held { HELD } else { self.tightness_of(i) };
-            prior.matrix[(place, place)] = tight;
-            prior.right[place] = tight * (self.expected[i] - self.values[i]);
+            prior.matrix[(i - asked, i - free)] = tight;
+            prior.right[i - asked] = tight * (self.expected[i] - self.values[i]);
         }
         self.tie_clocks(&mut prior);
         self.smooth(&mut prior);
         if self.free.contains(&rig) {
-            let at = rig - self.free.start;
             let information = self.rig_information(stage);
             let pull = &information * (&self.rig.prior - &self.rig.values);
             prior
                 .matrix
-                .view_mut((at, at), (count, count))
+                .view_mut((rig - asked, rig - free), (count, count))
                 .copy_from(&information);
-            prior.right.rows_mut(at, count).copy_from(&pull);
+            prior.right.rows_mut(rig - asked, count).copy_from(&pull);
         }
         prior
     }

@@ -150,10 +150,8 @@ impl Lidar {
     ) {
         let lever = contact.point - self.origin;
         let turn = along.cross(&lever);
-        for k in 0..3 {
-            out.push((first + k, turn[k]));
-            out.push((first + 3 + k, -along[k]));
-        }
+        out.extend((0..3).map(|k| (first + k, turn[k])));
+        out.extend((0..3).map(|k| (first + 3 + k, -along[k])));
         let range = lever.norm();
         out.push((first + 6, -along.dot(&self.up(&(lever / range))) * range));
     }

@@ -22,7 +22,9 @@ pub(super) const MIXED_ECHOES: u32 = 2;
 const FLAT_COSINE: (f64, f64) = (0.35, 0.22);
 
 /// So many echoes and edges bring the blade to where all of them can take it in one step: the gate is still wide.
-const WIDE: (usize, usize) = (3000, 1000);
+const WIDE: (usize, usize) = (1500, 500);
+/// The same of a stretch, of which less is unknown.
+const WIDE_STRETCH: (usize, usize) = (600, 250);
 
 /// At most so many echoes, evenly.
 pub(super) fn some(all: &[Echo], most: usize) -> impl Iterator<Item = &Echo> {
@@ -104,6 +106,7 @@ impl<'a> Rows<'a> {
             sums: Sums::new(
                 adjustment.problem.mesh.len(),
                 adjustment.touched_at(hold),
+                &adjustment.asked,
                 &adjustment.free,
             ),
             entries: Vec::new(),
@@ -170,9 +173,13 @@ impl<'a> Rows<'a> {
         let adjustment = self.adjustment;
         let most = adjustment.weights.echoes;
         let is_held_back = adjustment.is_vague() && !adjustment.follows_load;
+        let wide = match adjustment.follows_load {
+            true => WIDE_STRETCH,
+            false => WIDE,
+        };
         match self.gates.is_fine() || is_held_back {
             true => (most, usize::MAX),
-            false => (most.min(WIDE.0), WIDE.1),
+            false => (most.min(wide.0), wide.1),
         }
     }
 
@@ -186,11 +193,11 @@ impl<'a> Rows<'a> {
 
     pub(super) fn finish(mut self) -> (Part, Tally) {
         self.charge();
-        let free = &self.adjustment.free;
+        let asked = &self.adjustment.asked;
         let state = self.adjustment.state_at(self.hold).into_iter().enumerate();
-        let (places, unknowns): (Vec<_>, Vec<_>) = state.filter(|(_, i)| free.contains(i)).unzip();
+        let (places, unknowns): (Vec<_>, Vec<_>) = state.filter(|(_, i)| asked.contains(i)).unzip();
         (
-            self.sums.part(&unknowns, &self.posed.moves(&places)),
+            self.sums.part(unknowns, &self.posed.moves(&places)),
             self.tally,
         )
     }
@@ -333,20 +340,27 @@ impl<'a> Rows<'a> {
         if echo.ring < layout.channels[echo.lidar] {
             self.entries.push((first + RIG + echo.ring, -1.0));
         }
+        self.fill_surface(&hit.contact, &along);
         let ranges = self.places.ranges + RANGES * echo.lidar;
         let slopes = range_slopes_m(hit.cosine);
         self.entries
             .extend([(ranges, slopes[0]), (ranges + 1, slopes[1])]);
-        self.add_row(&hit.contact, moves, residual, weight);
+        self.add_row(&hit.contact, (&along, moves), residual, weight);
     }
 
+    /// Adds a row of which the entries are filled: how it moves with a displacement, and with the nodes.
     pub(super) fn add_row(
         &mut self,
         contact: &Contact,
-        moves: [f64; BOTH],
+        (along, moves): (&Vector3<f64>, [f64; BOTH]),
         residual: f64,
         weight: f64,
     ) {
+        if self.adjustment.asked.end > self.places.len {
+            // A strain is fitted as a check: everything moves away from the root.
+            let strain = along.dot(&contact.section.place);
+            self.entries.push((self.places.len + self.hold, strain));
+        }
         self.sums.add(&Row {
             node: contact.section.node,
             moves,
@@ -356,8 +370,18 @@ impl<'a> Rows<'a> {
         });
     }
 
-    /// How the nodes, and all unknowns but the state's and range errors, move `along . displacement` of
-    /// a contact against the lidar: the latter in `entries`.
+    /// How the surface moves `along . displacement` of a contact, behind what is in `entries`.
+    pub(super) fn fill_surface(&mut self, contact: &Contact, along: &Vector3<f64>) {
+        let (problem, first) = (&self.adjustment.problem, self.places.shape);
+        if self.adjustment.asked.end > first {
+            let (mesh, row) = (&problem.mesh, &mut self.entries);
+            problem.shape.slopes(mesh, contact, along, first, row);
+            problem.shape.waves(mesh, contact, along, first, row);
+        }
+    }
+
+    /// How the nodes, and unknowns of sway, clock and pose, move `along . displacement` of a contact against
+    /// the lidar: the latter in `entries`, which rise by their numbers.
     pub(super) fn fill_row(
         &mut self,
         contact: &Contact,
@@ -365,7 +389,7 @@ impl<'a> Rows<'a> {
         lidar: usize,
         time_ns: i64,
     ) -> [f64; BOTH] {
-        let (problem, layout) = (&self.adjustment.problem, &self.adjustment.layout);
+        let layout = &self.adjustment.layout;
         let about = (contact.point - contact.section.place).cross(along);
         let row = &mut self.entries;
         row.clear();
@@ -385,20 +409,8 @@ impl<'a> Rows<'a> {
             self.places.clock + lidar,
             along.dot(&velocity_m_s) * clock_s,
         ));
-        if self.adjustment.free.end > self.places.shape {
-            let (mesh, first) = (&problem.mesh, self.places.shape);
-            problem.shape.slopes(mesh, contact, along, first, row);
-            problem.shape.waves(mesh, contact, along, first, row);
-        }
-        if self.adjustment.free.end > self.places.lidars[0] {
+        if self.adjustment.asked.end > self.places.lidars[0] {
             self.lidars[lidar].slopes(contact, along, self.places.lidars[lidar], row);
-        }
-        if self.adjustment.free.end > self.places.len {
-            // A strain is fitted as a check: everything moves away from the root.
-            row.push((
-                self.places.len + self.hold,
-                along.dot(&contact.section.place),
-            ));
         }
         node_slopes(&contact.section, along, &about)
     }

@@ -11,10 +11,13 @@ use super::step::Step;
 use super::weights::{Tally, robust};
 use crate::error::BeamError;
 
-/// So many echoes of a hold suffice, and so many edges; so many echoes tell as much as one.
-const OF_BLADE: (usize, f64) = (2000, 1.0);
-/// The same where the surface is learned: neighbours are off alike while it is not known.
-const OF_SURFACE: (usize, f64) = (8000, 3.0);
+/// So many echoes and edges of a hold bring a blade that has a drawing near.
+const DRAWN: (usize, usize) = (600, 400);
+/// The same where no drawing tells how it is bent ...
+const UNDRAWN: (usize, usize) = (2000, 2000);
+/// ... and where its surface is learned; so many echoes then tell as much as one, for neighbours are off alike.
+const OF_SURFACE: (usize, usize) = (8000, 8000);
+const ALIKE: f64 = 3.0;
 /// A step that does no good is shortened to this share, at most so often.
 const SHORTENED: (f64, usize) = (0.4, 6);
 
@@ -24,9 +27,9 @@ impl Adjustment {
     pub(super) fn seek(&mut self, gates: &Gates) -> Result<Step, BeamError> {
         let all = self.free.clone();
         // What the stage holds would only make its equations larger.
-        self.free.end = self.open_until(gates.stage).min(all.end);
+        self.solve_for(all.start..self.open_until(gates.stage).min(all.end));
         let step = self.sought(gates);
-        self.free = all;
+        self.solve_for(all);
         step
     }
 
@@ -81,14 +84,15 @@ impl Rows<'_> {
     /// Looks at the data by distances of points.
     pub(super) fn look_near(&mut self) {
         let seen = &self.adjustment.problem.holds[self.hold].seen;
-        let (enough, alike) = match self.gates.stage {
-            Stage::Surface => OF_SURFACE,
-            _ => OF_BLADE,
+        let ((echoes, edges), alike) = match self.gates.stage {
+            Stage::Surface => (OF_SURFACE, ALIKE),
+            _ if self.adjustment.is_vague() => (UNDRAWN, 1.0),
+            _ => (DRAWN, 1.0),
         };
-        for echo in some(&seen.echoes, enough) {
+        for echo in some(&seen.echoes, echoes) {
             self.add_point(echo, alike);
         }
-        for edge in some_edges(&seen.edges, enough) {
+        for edge in some_edges(&seen.edges, edges) {
             self.add_edge(edge);
         }
     }
@@ -128,7 +132,8 @@ impl Rows<'_> {
         let weight = robust(near.off_m, sigma_m, self.gates.echo_m) / variance;
         let time_ns = self.time_ns(echo.lidar, echo.time_ns);
         let moves = self.fill_row(&near.contact, &near.towards, echo.lidar, time_ns);
-        self.add_row(&near.contact, moves, near.off_m, weight);
+        self.fill_surface(&near.contact, &near.towards);
+        self.add_row(&near.contact, (&near.towards, moves), near.off_m, weight);
     }
 }
 

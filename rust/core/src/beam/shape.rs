@@ -163,13 +163,12 @@ impl Shape {
         out.push((first + 1, self.trust.setting_rad * twist));
         out.push((first + 2, -self.trust.axis_fraction * local.dot(&chord)));
         let s_m = self.arc_m(mesh, contact);
-        for (knot, weight) in hats(s_m - self.from_m, self.trust.slow_knot_m, self.slow) {
-            out.push((first + 3 + knot, self.chord_wave(knot) * weight * swell));
-            out.push((
-                first + 3 + self.slow + knot,
-                self.trust.twist_waves_rad * weight * twist,
-            ));
-        }
+        let slow = hats(s_m - self.from_m, self.trust.slow_knot_m, self.slow);
+        let first = first + 3;
+        out.extend(slow.map(|(knot, share)| (first + knot, self.chord_wave(knot) * share * swell)));
+        let first = first + self.slow;
+        let twist = self.trust.twist_waves_rad * twist;
+        out.extend(slow.map(|(knot, share)| (first + knot, share * twist)));
     }
 
     /// The same for the waves, which stand out along the normal.
@@ -186,6 +185,9 @@ impl Shape {
         let node = contact.section.node;
         let is_second = mesh.is_second_side(contact.vertex);
         let mut add = |knots: &Knots, offset: usize, size_m: f64, heights: &[f64]| {
+            if heights.iter().all(|height| *height == 0.0) {
+                return; // an edge, where no wave stands
+            }
             for (place, share) in knots.beside(x_m) {
                 let slope = outward * size_m * share;
                 let each = heights.iter().enumerate();

@@ -22,16 +22,14 @@ struct Small {
 impl Adjustment {
     /// Adds to what is known before the data that neighbours differ little.
     pub(super) fn smooth(&self, prior: &mut Normal) {
-        for small in self
-            .small()
-            .filter(|small| prior.free.contains(&small.first))
-        {
-            let (at, weight) = (small.first - prior.free.start, small.sigma.powi(-2));
-            let sum = self.sum(&small);
+        let (asked, free) = (prior.asked.start, prior.free.clone());
+        for small in self.small().filter(|small| free.contains(&small.first)) {
+            let (row, column) = (small.first - asked, small.first - free.start);
+            let (sum, weight) = (self.sum(&small), small.sigma.powi(-2));
             for (i, one) in small.weights.iter().enumerate() {
-                prior.right[at + i] -= weight * one * sum;
+                prior.right[row + i] -= weight * one * sum;
                 for (j, other) in small.weights.iter().enumerate().take(i + 1) {
-                    prior.matrix[(at + i, at + j)] += weight * one * other;
+                    prior.matrix[(row + i, column + j)] += weight * one * other;
                 }
             }
         }
@@ -104,7 +102,7 @@ mod tests {
         let knots = part.layout.knots[0];
         let first = part.layout.sway_at(0) + knots;
         (0..knots).for_each(|k| part.values[first + k] = of(k));
-        let mut prior = Normal::new(part.free.clone());
+        let mut prior = Normal::new(&part.free, &part.free);
         part.smooth(&mut prior);
         let at = first - prior.free.start;
         prior.right.rows(at, knots).iter().copied().collect()

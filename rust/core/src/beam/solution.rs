@@ -52,7 +52,7 @@ impl Adjustment {
     fn with_strains(&self) -> Self {
         let (count, holds) = (self.layout.len(), self.problem.holds.len());
         let mut wide = self.clone();
-        wide.free = 0..count + holds;
+        wide.solve_for(0..count + holds);
         let longer =
             |values: &DVector<f64>, value| values.clone().resize_vertically(count + holds, value);
         wide.values = longer(&self.values, 0.0);

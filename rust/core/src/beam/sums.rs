@@ -33,7 +33,8 @@ pub struct Row<'a> {
     pub weight: f64,
 }
 
-/// Sums of weighted rows of one hold. Place 0 of others is the residual.
+/// Sums of weighted rows of one hold. Place 0 of others is the residual; the others follow by their numbers, and
+/// so they have to come in every row.
 #[derive(Debug)]
 pub struct Sums {
     start: usize,
@@ -46,7 +47,7 @@ pub struct Sums {
     near: DMatrix<f64>,
     /// Others with moves: a column per move.
     cross: DMatrix<f64>,
-    /// Others with each other; each product once, on either side of the diagonal.
+    /// Others with each other: a column for those that are solved for, the lower triangle alone.
     own: DMatrix<f64>,
     panel: Panel,
     /// Nodes whose moves are summed.
@@ -56,40 +57,49 @@ pub struct Sums {
     rows: usize,
 }
 
-/// Sums of one hold by its unknowns, those of the state first. Only the lower triangle counts.
+/// Sums of one hold by its unknowns, as [`super::normal::Normal`] takes them. Place 0 of others is the residual.
 #[derive(Debug)]
 pub struct Part {
-    /// Which unknowns.
-    pub unknowns: Vec<usize>,
-    /// Sum of row^T weight row.
-    pub matrix: DMatrix<f64>,
-    /// Sum of row^T weight residual.
-    pub right: Vec<f64>,
-    /// Weighted sum of squared residuals.
-    pub cost: f64,
+    /// Which unknowns of the state, and which others behind the residual.
+    pub state: Vec<usize>,
+    /// See `state`; rising.
+    pub others: Vec<usize>,
+    /// The state with itself.
+    pub states: DMatrix<f64>,
+    /// Others with the state.
+    pub crossed: DMatrix<f64>,
+    /// Others with the first of them: the lower triangle alone.
+    pub own: DMatrix<f64>,
     /// Rows.
     pub rows: usize,
 }
 
 impl Sums {
-    /// Of rows at `nodes` nodes that touch `unknowns` beside the state; of these the ones in `free` are summed.
-    pub fn new(nodes: usize, unknowns: impl Iterator<Item = usize>, free: &Range<usize>) -> Self {
-        let others: Vec<usize> = unknowns.filter(|i| free.contains(i)).collect();
-        let mut places = vec![NOWHERE; free.len()];
+    /// Of rows at `nodes` nodes that touch `unknowns`, rising, beside the state; of these the ones in `asked` are
+    /// summed, with each other as far as one of both is in `free`, behind which the other ones stand.
+    pub fn new(
+        nodes: usize,
+        unknowns: impl Iterator<Item = usize>,
+        asked: &Range<usize>,
+        free: &Range<usize>,
+    ) -> Self {
+        let others: Vec<usize> = unknowns.filter(|i| asked.contains(i)).collect();
+        let mut places = vec![NOWHERE; asked.len()];
         for (place, unknown) in others.iter().enumerate() {
-            places[unknown - free.start] = place + 1;
+            places[unknown - asked.start] = place + 1;
         }
         let size = others.len() + 1;
+        let columns = others.partition_point(|unknown| *unknown < free.end) + 1;
         Self {
             near: DMatrix::zeros(BOTH, MOVES * nodes),
             cross: DMatrix::zeros(size, MOVES * nodes),
-            own: DMatrix::zeros(size, size),
+            own: DMatrix::zeros(size, columns),
             panel: Panel::default(),
             nodes: nodes..0,
             touched: Vec::new(),
             values: Vec::new(),
             rows: 0,
-            start: free.start,
+            start: asked.start,
             places,
             others,
         }
@@ -110,6 +120,7 @@ impl Sums {
                 self.values.push(*slope);
             }
         }
+        debug_assert!(self.touched.is_sorted());
         if !self.panel.suits(row.node, &self.touched) {
             self.flush();
             self.panel.begin(row.node, &self.touched, BOTH);
@@ -127,7 +138,8 @@ impl Sums {
         let mut panel = std::mem::take(&mut self.panel);
         self.nodes = self.nodes.start.min(panel.node)..self.nodes.end.max(panel.node + 2);
         let (first, places) = (MOVES * panel.node, std::mem::take(&mut panel.places));
-        for (i, line) in panel.multiply().take(BOTH + places.len()).enumerate() {
+        let columns = places.partition_point(|place| *place < self.own.ncols());
+        for (i, line) in panel.multiply(BOTH + columns).enumerate() {
             let (moves, others) = line.split_at(BOTH);
             if i < BOTH {
                 self.add_move(first + i, i, moves, (&places, others));
@@ -157,40 +169,18 @@ impl Sums {
 
     /// The sums by unknowns: `state` are those of the state, each with a column of `moves` that says what
     /// it does to every move.
-    pub fn part(mut self, state: &[usize], moves: &DMatrix<f64>) -> Part {
+    pub fn part(mut self, state: Vec<usize>, moves: &DMatrix<f64>) -> Part {
         self.flush();
-        let (inner, size) = (state.len(), self.others.len());
-        let mut matrix = DMatrix::zeros(inner + size, inner + size);
         let first = MOVES * self.nodes.start.min(self.nodes.end);
         let count = MOVES * self.nodes.len();
         let moves = moves.rows(first, count);
-        let states = moves.tr_mul(&self.near_times(&moves, first));
-        matrix.view_mut((0, 0), (inner, inner)).copy_from(&states);
-        let crossed = self.cross.columns(first, count) * moves;
-        let below = crossed.rows(1, size);
-        matrix.view_mut((inner, 0), (size, inner)).copy_from(&below);
-        self.fold();
-        let own = self.own.view((1, 1), (size, size));
-        matrix
-            .view_mut((inner, inner), (size, size))
-            .copy_from(&own);
-        let of_state = crossed.row(0);
-        let of_others = self.own.view((1, 0), (size, 1));
         Part {
-            unknowns: state.iter().chain(&self.others).copied().collect(),
-            matrix,
-            right: of_state.iter().chain(of_others.iter()).copied().collect(),
-            cost: self.own[(0, 0)],
+            states: moves.tr_mul(&self.near_times(&moves, first)),
+            crossed: self.cross.columns(first, count) * moves,
+            own: self.own,
             rows: self.rows,
-        }
-    }
-
-    /// Brings the products of others to the lower triangle.
-    fn fold(&mut self) {
-        for j in 0..self.own.ncols() {
-            for i in j + 1..self.own.nrows() {
-                self.own[(i, j)] += self.own[(j, i)];
-            }
+            state,
+            others: self.others,
         }
     }
 
@@ -228,6 +218,7 @@ fn scatter(sums: &mut DMatrix<f64>, column: usize, rows: &[usize], products: &[f
 
 #[cfg(test)]
 mod tests {
+    use super::super::normal::Normal;
     use super::*;
 
     const STATE: [usize; 3] = [1, 2, 7];
@@ -241,7 +232,7 @@ mod tests {
     fn sums_by_way_of_nodes_are_those_of_whole_rows() {
         let free = 1..20;
         let moves = DMatrix::from_fn(MOVES * 4, STATE.len(), |i, j| number(31 * i + 7 * j));
-        let mut sums = Sums::new(4, 8..20, &free);
+        let mut sums = Sums::new(4, 8..20, &free, &free);
         let mut expected = DMatrix::<f64>::zeros(20, 20);
         let mut right = [0.0; 20];
         for k in 0..200 {
@@ -267,12 +258,13 @@ mod tests {
                 (0..20).for_each(|j| expected[(i, j)] += row.weight * whole[i] * whole[j]);
             }
         }
-        let part = sums.part(&STATE, &moves);
-        assert_eq!(part.rows, 200);
-        for (i, one) in part.unknowns.iter().enumerate() {
-            assert!((part.right[i] - right[*one]).abs() < 1e-9, "{one}");
-            for (j, two) in part.unknowns[..=i].iter().enumerate() {
-                let error = part.matrix[(i, j)] - expected[(*one, *two)];
+        let mut normal = Normal::new(&free, &free);
+        normal.join(&sums.part(STATE.to_vec(), &moves));
+        assert_eq!(normal.rows, 200);
+        for one in (1..20).filter(|one| STATE.contains(one) || *one >= 8) {
+            assert!((normal.right[one - 1] - right[one]).abs() < 1e-9, "{one}");
+            for two in 1..=one {
+                let error = normal.matrix[(one - 1, two - 1)] - expected[(one, two)];
                 assert!(error.abs() < 1e-9, "{one} {two}");
             }
         }

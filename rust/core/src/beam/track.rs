@@ -22,8 +22,8 @@ const KNOT_NS: i64 = 50_000_000;
 /// Standard deviation of the load against its channel, share of full load.
 const LOAD_SHARE: f64 = 0.02;
 /// At most so many echoes of a stretch are used: what the holds told of lidars and surface leaves more unsure
-/// than their noise.
-const ECHOES: usize = 8000;
+/// than their noise. Its edges are few, and all of them are.
+const ECHOES: usize = 4000;
 /// Weight of what the holds on both sides tell of a state's own unknowns: it is known to a fifth.
 const OWN_TIGHTNESS: f64 = 25.0;
 
@@ -113,7 +113,7 @@ impl Adjustment {
         let mut modes_m = vec![LOAD_SHARE];
         modes_m.extend(sway_m);
         let mut blank = self.like(problem, layout);
-        blank.free = free;
+        blank.solve_for(free);
         blank.weights.echoes = blank.weights.echoes.min(ECHOES);
         blank.modes_m = modes_m;
         blank.knot_ns = KNOT_NS;
@@ -187,7 +187,8 @@ impl Adjustment {
             true => self.free.clone(),
             false => 0..self.layout.len(),
         };
-        let (normal, tally) = self.last_step(&gates[gates.len() - 1], asked)?;
+        self.asked = asked;
+        let (normal, tally) = self.last_step(&gates[gates.len() - 1])?;
         let factor = self.free_factor(&normal)?;
         let known = factor.inverse();
         let (knowledge, posed) = (reference.1, self.posed(0));
@@ -219,17 +220,10 @@ impl Adjustment {
         Ok(found)
     }
 
-    /// The last step, with the whole normal equations over all that is `asked` for, that led to it.
-    pub(super) fn last_step(
-        &mut self,
-        gates: &Gates,
-        asked: Range<usize>,
-    ) -> Result<(Normal, Tally), BeamError> {
-        let free = std::mem::replace(&mut self.free, asked);
-        let (mut normal, mut tallies) = self.normal(gates);
-        self.free = free;
-        normal.matrix.fill_upper_triangle_with_lower_triangle();
-        let first = self.free.start - normal.free.start;
+    /// The last step, with the normal equations that led to it.
+    pub(super) fn last_step(&mut self, gates: &Gates) -> Result<(Normal, Tally), BeamError> {
+        let (normal, mut tallies) = self.normal(gates);
+        let first = self.free.start - self.asked.start;
         let right = normal.right.rows(first, self.free.len());
         let step = self.free_factor(&normal)?.solve(&right);
         let mut at = self.values.rows_mut(self.free.start, self.free.len());
@@ -238,8 +232,8 @@ impl Adjustment {
     }
 
     pub(super) fn free_factor(&self, normal: &Normal) -> Result<Cholesky<f64, Dyn>, BeamError> {
-        let (first, count) = (self.free.start - normal.free.start, self.free.len());
-        let block = normal.matrix.view((first, first), (count, count));
+        let (first, count) = (self.free.start - self.asked.start, self.free.len());
+        let block = normal.matrix.rows(first, count);
         block.into_owned().cholesky().ok_or(BeamError::Singular)
     }
 

@@ -93,9 +93,11 @@ impl Rows<'_> {
         let edge_at = self.places.edge;
         let along = across(plane, silhouette);
         let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
+        self.fill_surface(&silhouette.contact, &along);
         self.entries
             .extend([(edge_at, EDGE_RAD), (at, EDGE_OFFSET_RAD)]);
-        self.add_row(&silhouette.contact, moves, residual, firm * weight);
+        let row = (&along, moves);
+        self.add_row(&silhouette.contact, row, residual, firm * weight);
     }
 }
 
