@@ -48,7 +48,8 @@ class Drawing:
     shape_trust
         Of chord and its waves (relative; at the tip the latter grow by a factor), setting angle and
         waves of twist (rad), axis (chord lengths), contour (share of what blades differ by) and
-        waves of the surface (m); distances of the knots of chord and twist, and of waves (m).
+        waves of the surface (m); distances of the knots of chord and twist, and of waves (m); second
+        differences of the knots of chord and twist, over their deviations (0: as they come).
     source
         ``drawing`` or ``generic``.
     """

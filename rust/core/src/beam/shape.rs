@@ -25,8 +25,8 @@ pub struct ShapeTrust {
     pub setting_rad: f64,
     /// Of the twist as it varies along the span, rad.
     pub twist_waves_rad: f64,
-    /// How much less smoothly both vary: second difference of their knots over the two above; none where a
-    /// drawing tells them.
+    /// Of second differences of the knots of chord and twist, over the two above; 0 where knots are independent, as
+    /// with a drawing.
     pub bend: f64,
     /// Of the axis within the chord, chord lengths.
     pub axis_fraction: f64,

@@ -2,7 +2,8 @@
 
 use super::Shape;
 
-/// A blade ends like an ellipse: the logarithm of its chord bends by this over the square of the distance left.
+/// A blade ends like an ellipse, the logarithm of whose chord bends by this over the square of the distance left;
+/// blades differ by as much.
 const ELLIPSE: f64 = 0.5;
 
 /// A sum of neighbouring unknowns that is small.
@@ -45,5 +46,39 @@ impl Shape {
             weights: [1.0, -2.0, 1.0],
             sigma: self.trust.bend,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ShapeTrust;
+    use super::*;
+    use crate::beam::sample;
+
+    fn shape(bend: f64) -> Shape {
+        let trust = ShapeTrust {
+            bend,
+            slow_knot_m: 0.8,
+            ..ShapeTrust::default()
+        };
+        let mesh = &sample::adjustment(0.0).problem.mesh;
+        Shape::new(mesh, trust, 0.5 * mesh.length_m())
+    }
+
+    #[test]
+    fn a_chord_may_bend_more_the_nearer_the_tip() {
+        let shape = shape(0.02);
+        let chord: Vec<Bend> = shape
+            .bends()
+            .filter(|bend| bend.first < 3 + shape.slow)
+            .collect();
+        assert_eq!(chord.len(), shape.slow - 2);
+        assert!(chord.windows(2).all(|two| two[0].sigma < two[1].sigma));
+        assert!(chord[0].sigma > 0.02);
+    }
+
+    #[test]
+    fn with_a_drawing_knots_are_independent() {
+        assert_eq!(shape(0.0).bends().count(), 0);
     }
 }
