@@ -9,18 +9,17 @@ import numpy as np
 
 from lidar_deflect import _native, geometry
 from lidar_deflect.measurement import paper
-from lidar_deflect.measurement.beam import generic
+from lidar_deflect.measurement.beam import generic, trust
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from lidar_deflect.config import Blade, Config
+    from lidar_deflect.config import Config
+    from lidar_deflect.measurement.beam.trust import BendTrust, ShapeTrust
     from lidar_deflect.measurement.inputs import Inputs
 
     Floats = NDArray[np.float64]
 
-COUPLING = 0.06
-"""Coupling of both bendings over the mean of their stiffnesses: up to 0.16 in published blades."""
 SADDLE_SHARES = (0.3, 0.5, 0.7, 0.86)
 """Where load is taken to enter, as shares of the length, when the configuration does not tell."""
 
@@ -40,23 +39,15 @@ class Drawing:
     ----------
     blade
         The blade of the compiled core.
-    trust
-        Number of functions along the span, and prior deviations of stiffness (relative, at the
-        root; how many times as large at the tip), weight, prebend (relative), stress-free curvature
-        (rad/m), the root's rotation (rad) and the coupling of both bendings (share of their
-        stiffness).
-    shape_trust
-        Of chord and its waves (relative; at the tip the latter grow by a factor), setting angle and
-        waves of twist (rad), axis (chord lengths), contour (share of what blades differ by) and
-        waves of the surface (m); distances of the knots of chord and twist, and of waves (m); second
-        differences of the knots of chord and twist, over their deviations (0: as they come).
+    trust, shape_trust
+        By what bends it, and by its surface.
     source
         ``drawing`` or ``generic``.
     """
 
     blade: _native.BeamBlade
-    trust: tuple[float, ...]
-    shape_trust: tuple[float, ...]
+    trust: BendTrust
+    shape_trust: ShapeTrust
     source: str
 
 
@@ -68,28 +59,10 @@ def drawing_of(inputs: Inputs) -> Drawing:
     if given is None or given.contours is None or columns is None:
         at_m, outlines = generic.outlines(blade)
         native = _native_of(inputs.config, sides, generic.stations(blade), at_m, outlines)
-        return Drawing(native, GENERIC_TRUST, _generic_shape(blade), "generic")
+        return Drawing(native, trust.UNDRAWN, trust.undrawn_shape(blade), "generic")
     outlines = np.stack([given.contours.x_c, given.contours.y_c], axis=2)
     native = _native_of(inputs.config, sides, columns, given.contours.s_m, outlines)
-    return Drawing(native, TRUST, _drawn_shape(blade), "drawing")
-
-
-TRUST = (5, 0.05, 1.0, 0.5, 0.05, 1.5e-5, 1e-3, COUPLING)
-GENERIC_TRUST = (10, 0.2, 3.0, 0.7, 0.8, 3e-4, 2e-3, COUPLING)
-"""More functions along the span: what is seen of the outer blade tells little of the inner."""
-AXIS_U = 0.03
-"""Without a drawing the axis may not go farther from where it is said to be: twist moves it, and
-errors of the contour would pass for that."""
-
-
-def _drawn_shape(blade: Blade) -> tuple[float, ...]:
-    return (0.004, 0.001, 1.0, np.radians(blade.setting_u_deg), 0.0005, 0.002, 0.0, 0.002, 9.0, 1.0, 0.0)
-
-
-def _generic_shape(blade: Blade) -> tuple[float, ...]:
-    setting_rad = max(np.radians(blade.setting_u_deg), 0.03)
-    axis = min(blade.axis_fraction_u, AXIS_U)
-    return (0.2, 0.2, 3.0, setting_rad, 0.03, axis, 0.7, 0.006, 0.8, 2.0, 0.02)
+    return Drawing(native, trust.DRAWN, trust.drawn_shape(blade), "drawing")
 
 
 def _native_of(
