@@ -226,18 +226,30 @@ impl CellPass {
         }
         self.feed.read_on(py, threads, progress.as_ref())?;
         let is_last = self.feed.has_ended();
-        let mut rows = Vec::new();
-        for (place, taker) in self.feed.reading.takers().enumerate() {
-            for window in taker.ready(is_last) {
-                rows.push(row(py, place, window)?);
-            }
-        }
-        Ok(Some(rows))
+        let takers = self.feed.reading.takers().enumerate();
+        Ok(Some(ready(py, takers, is_last)?))
     }
 }
 
+/// The windows that are over of lidars by their places.
+pub fn ready<'py, 'a>(
+    py: Python<'py>,
+    takers: impl Iterator<Item = (usize, &'a mut WindowTaker)>,
+    is_last: bool,
+) -> PyResult<Vec<WindowRow<'py>>> {
+    takers
+        .flat_map(|(place, taker)| {
+            taker
+                .ready(is_last)
+                .into_iter()
+                .map(move |own| (place, own))
+        })
+        .map(|(place, window)| row(py, place, window))
+        .collect()
+}
+
 /// One window as Python gets it.
-pub fn row(py: Python<'_>, place: usize, window: Window) -> PyResult<WindowRow<'_>> {
+fn row(py: Python<'_>, place: usize, window: Window) -> PyResult<WindowRow<'_>> {
     let cells = window.cell.into_pyarray(py);
     let xyz = arrays::rows(py, window.xyz_m)?;
     Ok((place, cells, xyz, window.from_ns, window.to_ns))

@@ -13,10 +13,13 @@ const FOURTH: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ROUGH: [f64; 5] = [0.004, 0.03, 0.03, 0.016, 0.016];
 
 /// A weighted sum of unknowns in a row that is known to be small.
-struct Small {
-    first: usize,
-    weights: Vec<f64>,
-    sigma: f64,
+pub(super) struct Small {
+    /// The first of them.
+    pub first: usize,
+    /// Their weights.
+    pub weights: Vec<f64>,
+    /// Standard deviation of the sum.
+    pub sigma: f64,
 }
 
 impl Adjustment {
@@ -53,8 +56,7 @@ impl Adjustment {
         let first = self.layout.shape_at();
         self.problem.shape.bends().map(move |bend| Small {
             first: first + bend.first,
-            weights: bend.weights.to_vec(),
-            sigma: bend.sigma,
+            ..bend
         })
     }
 

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use super::{DistancePass, FramePlan};
 use crate::capture::reading::ReadingFeed;
 use crate::error::BorderResult;
-use crate::watch::{GridRow, WindowRow, Windows, grid_of, row};
+use crate::watch::{GridRow, WindowRow, Windows, grid_of, ready};
 
 /// Reads a capture into frames, and gives the echoes on watched cells, window by window.
 #[pyclass(module = "lidar_deflect._native")]
@@ -75,16 +75,9 @@ impl WatchedPass {
         if let Some(survey) = &mut self.survey {
             survey.take(frames);
         }
-        let mut rows = Vec::new();
-        for (place, taker) in self.places.iter().zip(reading.windows()) {
-            let ready = taker.ready(is_last);
-            if let Some(place) = place {
-                for window in ready {
-                    rows.push(row(py, *place, window)?);
-                }
-            }
-        }
-        Ok(Some(rows))
+        let all = self.places.iter().zip(reading.windows());
+        let takers = all.filter_map(|(place, taker)| place.map(|place| (place, taker)));
+        Ok(Some(ready(py, takers, is_last)?))
     }
 
     /// The first pass over the frames so far; None where it was taken before.

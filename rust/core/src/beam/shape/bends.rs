@@ -1,25 +1,15 @@
 //! Chord and twist of a blade without a drawing vary smoothly, but towards the tip.
 
 use super::Shape;
+use crate::beam::smooth::Small;
 
 /// A blade ends like an ellipse, the logarithm of whose chord bends by this over the square of the distance left;
 /// blades differ by as much.
 const ELLIPSE: f64 = 0.5;
 
-/// A sum of neighbouring unknowns that is small.
-#[derive(Debug, Clone, Copy)]
-pub struct Bend {
-    /// The first of them.
-    pub first: usize,
-    /// Their weights.
-    pub weights: [f64; 3],
-    /// Standard deviation of the sum.
-    pub sigma: f64,
-}
-
 impl Shape {
-    /// Second differences of the knots of chord and twist.
-    pub fn bends(&self) -> impl Iterator<Item = Bend> {
+    /// Second differences of the knots of chord and twist, by number among the unknowns of the surface.
+    pub(in crate::beam) fn bends(&self) -> impl Iterator<Item = Small> {
         let inner = match self.trust.bend > 0.0 {
             true => 0..self.slow.saturating_sub(2),
             false => 0..0,
@@ -27,12 +17,12 @@ impl Shape {
         inner.flat_map(|knot| [self.chord_bend(knot), self.twist_bend(knot)])
     }
 
-    fn chord_bend(&self, knot: usize) -> Bend {
+    fn chord_bend(&self, knot: usize) -> Small {
         let left = (self.slow - 2 - knot) as f64;
         let share = |k: usize| self.chord_wave(knot + k) / self.trust.chord_waves;
-        Bend {
+        Small {
             first: 3 + knot,
-            weights: [share(0), -2.0 * share(1), share(2)],
+            weights: vec![share(0), -2.0 * share(1), share(2)],
             sigma: self
                 .trust
                 .bend
@@ -40,10 +30,10 @@ impl Shape {
         }
     }
 
-    fn twist_bend(&self, knot: usize) -> Bend {
-        Bend {
+    fn twist_bend(&self, knot: usize) -> Small {
+        Small {
             first: 3 + self.slow + knot,
-            weights: [1.0, -2.0, 1.0],
+            weights: vec![1.0, -2.0, 1.0],
             sigma: self.trust.bend,
         }
     }
@@ -68,7 +58,7 @@ mod tests {
     #[test]
     fn a_chord_may_bend_more_the_nearer_the_tip() {
         let shape = shape(0.02);
-        let chord: Vec<Bend> = shape
+        let chord: Vec<Small> = shape
             .bends()
             .filter(|bend| bend.first < 3 + shape.slow)
             .collect();
