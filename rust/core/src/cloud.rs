@@ -198,19 +198,17 @@ impl<F> PointCloud<F> {
         self.block.clear();
     }
 
-    /// Azimuths in degrees, [0, 360).
-    pub fn azimuth_deg(&self) -> Vec<f32> {
-        self.azimuths_deg().collect()
+    /// Takes the azimuths out, in degrees, [0, 360).
+    pub fn take_azimuth_deg(&mut self) -> Vec<f32> {
+        // Consumed and not borrowed: the memory stays where it is.
+        let azimuth_rad = std::mem::take(&mut self.azimuth_rad).into_iter();
+        azimuth_rad.map(|rad| in_degrees(&rad)).collect()
     }
 
-    /// The same, one by one.
-    pub fn azimuths_deg(&self) -> impl Iterator<Item = f32> {
-        self.azimuth_rad.iter().map(in_degrees)
-    }
-
-    /// Meanings of the returns as numbers: the place of each in the declaration of [`ReturnKind`].
-    pub fn return_kind_codes(&self) -> Vec<u8> {
-        self.return_kind.iter().map(|kind| *kind as u8).collect()
+    /// Takes the meanings of the returns out as numbers: the place of each in the declaration of [`ReturnKind`].
+    pub fn take_return_kind_codes(&mut self) -> Vec<u8> {
+        let return_kind = std::mem::take(&mut self.return_kind).into_iter();
+        return_kind.map(|kind| kind as u8).collect()
     }
 
     /// Makes room for `additional` more echoes.

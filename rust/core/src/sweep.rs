@@ -9,9 +9,10 @@ use std::f64::consts::TAU;
 use crate::angle::Arc;
 use crate::cloud::PointCloud;
 use crate::frame::Sensor;
+use crate::packet::part::Part;
 use crate::packet::{Decoded, Head};
 use crate::time::Timestamp;
-pub use kept::Kept;
+pub use kept::{Gathered, Kept};
 pub use turns::Turns;
 
 /// One turn of one lidar.
@@ -44,6 +45,24 @@ pub struct Gap {
     pub from: Timestamp,
     /// When the next packet that arrived began.
     pub to: Timestamp,
+}
+
+impl<K> Sweep<K> {
+    /// The same turn with something else in the place of its returns, and what was there.
+    pub fn exchanged<L>(self, cloud: L) -> (Sweep<L>, K) {
+        let sweep = Sweep {
+            lidar: self.lidar,
+            index: self.index,
+            cloud,
+            start: self.start,
+            end: self.end,
+            coverage: self.coverage,
+            packets: self.packets,
+            lost: self.lost,
+            gaps: self.gaps,
+        };
+        (sweep, self.cloud)
+    }
 }
 
 /// One packet in its place, for the cutter.
@@ -86,7 +105,7 @@ struct Open<K> {
     gaps: Vec<Gap>,
 }
 
-impl<K: Kept> SweepCutter<K> {
+impl<K: Gathered> SweepCutter<K> {
     /// Cuts at encoder azimuth `cut_rad`; `visible_rad` is the angle of the turn that the sensor sends.
     /// Turns come out whose number is a multiple of `every`.
     pub fn new(lidar: usize, cut_rad: f64, visible_rad: f64, every: u32) -> Self {
@@ -142,8 +161,14 @@ impl<K: Kept> SweepCutter<K> {
         self.spare.push(cloud);
     }
 
-    /// Adds one packet; finished sweeps are appended to `out`.
-    pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep<K>>) {
+    /// Adds one packet: `put` adds each of its parts to the turn that it belongs to, but for turns that nobody
+    /// wants; finished sweeps are appended to `out`.
+    pub fn cut(
+        &mut self,
+        packet: &Placed,
+        out: &mut VecDeque<Sweep<K>>,
+        put: impl FnMut(&mut K, Part),
+    ) {
         let start_rad = self.turns.place(packet);
         let end_rad = start_rad + packet.head.turned_rad.max(0.0);
         let lost_behind_cut = self.add_lost(packet, start_rad);
@@ -165,8 +190,18 @@ impl<K: Kept> SweepCutter<K> {
             open.packets += 1;
             open.lost = open.lost.saturating_add(lost_behind_cut);
         }
-        self.fill(packet, decoded, start_rad, end_rad, out);
+        self.fill(packet, [start_rad, end_rad], out, put);
         self.turns.follow(packet, start_rad);
+    }
+
+    /// Adds one packet and its returns.
+    pub fn push(&mut self, packet: &Placed, decoded: &Decoded, out: &mut VecDeque<Sweep<K>>)
+    where
+        K: Kept,
+    {
+        self.cut(packet, out, |kept, part| {
+            kept.take(&decoded.cloud, decoded.places(&packet.head, part));
+        });
     }
 
     /// The sweep that is not complete yet, at the end of the stream.
@@ -234,38 +269,35 @@ impl<K: Kept> SweepCutter<K> {
         });
     }
 
-    /// Adds the packet's returns, cutting where it passes the cut.
+    /// Adds the packet's parts, cutting where it passes the cut.
     fn fill(
         &mut self,
         packet: &Placed,
-        decoded: &Decoded,
-        start_rad: f64,
-        end_rad: f64,
+        [start_rad, end_rad]: [f64; 2],
         out: &mut VecDeque<Sweep<K>>,
+        mut put: impl FnMut(&mut K, Part),
     ) {
-        let mut from = 0;
-        let mut from_rad = start_rad;
+        let mut since_rad = None;
         while let Some(open) = &mut self.open {
             let cut_rad = Turns::cut_after(open.turn);
-            if end_rad < cut_rad {
-                break;
+            let until_rad = (end_rad >= cut_rad).then_some(cut_rad - start_rad);
+            if open.turn.is_multiple_of(self.every) {
+                let part = Part {
+                    since_rad,
+                    until_rad,
+                };
+                put(&mut open.cloud, part);
             }
-            let to = decoded.before(from, &packet.head, cut_rad - start_rad);
-            open.cloud.take(&decoded.cloud, from..to);
-            open.seen_rad += packet
-                .head
-                .seen_rad(from_rad - start_rad, cut_rad - start_rad);
-            let time = packet.head.time_at(packet.time, cut_rad - start_rad);
+            open.seen_rad += packet.head.seen_rad(
+                since_rad.unwrap_or(0.0),
+                until_rad.unwrap_or(end_rad - start_rad),
+            );
+            let Some(turned_rad) = until_rad else { break };
+            let time = packet.head.time_at(packet.time, turned_rad);
             let turn = open.turn + 1;
             self.close(time, out);
             self.open(turn, time);
-            (from, from_rad) = (to, cut_rad);
-        }
-        if let Some(open) = &mut self.open {
-            open.cloud.take(&decoded.cloud, from..decoded.cloud.len());
-            open.seen_rad += packet
-                .head
-                .seen_rad(from_rad - start_rad, end_rad - start_rad);
+            since_rad = until_rad;
         }
     }
 }

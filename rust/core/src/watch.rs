@@ -10,7 +10,7 @@ use std::ops::Range;
 use crate::cloud::PointCloud;
 use crate::frame::Sensor;
 use crate::stream::Taker;
-use crate::sweep::{Kept, Sweep};
+use crate::sweep::{Gathered, Kept, Sweep};
 
 /// How echoes fall into cells: so many steps of azimuth to a turn, and the turns of all beams in a row.
 #[derive(Debug, Clone, Copy)]
@@ -265,7 +265,9 @@ impl Kept for CellEchoes {
         self.azimuth_rad
             .extend_from_slice(&from.azimuth_rad[places]);
     }
+}
 
+impl Gathered for CellEchoes {
     fn count(&self) -> usize {
         self.xyz_m.len()
     }

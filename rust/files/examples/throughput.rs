@@ -1,18 +1,28 @@
 //! How fast does a capture go through each stage? For `benches/peers`, which runs it beside other programs.
 //!
 //! `cargo run --release --example throughput -- JOB CAPTURE`, JOB one of `bytes` (read and decompress alone), `datagrams`,
-//! `scan`, `sweeps` (with the scan before it) and `stream` (with a look at the head instead): prints seconds, datagrams and points.
+//! `scan`, `sweeps` (with the scan before it), `stream` (with a look at the head instead) and `two` (the same on two
+//! threads): prints seconds, datagrams and points.
 
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use lidar_deflect_core::stream::{Scan, ScanOptions, ScanReport, SweepOptions, SweepReader};
-use lidar_deflect_files::CaptureSet;
+use lidar_deflect_core::capture::DatagramBatch;
+use lidar_deflect_core::cloud::PointCloud;
+use lidar_deflect_core::frame::Sensor;
+use lidar_deflect_core::stream::{
+    Abreast, Reading, Scan, ScanOptions, ScanReport, SweepOptions, SweepReader,
+};
+use lidar_deflect_files::{CaptureSet, FileError};
+use rayon::ThreadPoolBuilder;
 
 /// Datagrams of a look at the head: two seconds of a small lidar.
 const HEAD: u64 = 1500;
+
+/// Bytes of a batch, as the extension reads them.
+const BATCH_BYTES: usize = 1 << 19;
 
 type Outcome = Result<(u64, u64), Box<dyn std::error::Error>>;
 
@@ -27,7 +37,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "scan" => (scan(&paths, u64::MAX)?.datagrams, 0),
         "sweeps" => sweeps(&paths, u64::MAX)?,
         "stream" => sweeps(&paths, HEAD)?,
-        _ => return Err("JOB is bytes, datagrams, scan, sweeps or stream".into()),
+        "two" => abreast(&paths, 2)?,
+        _ => return Err("JOB is bytes, datagrams, scan, sweeps, stream or two".into()),
     };
     println!("{} {count} {points}", begun.elapsed().as_secs_f64());
     Ok(())
@@ -84,4 +95,43 @@ fn sweeps(paths: &[PathBuf], head: u64) -> Outcome {
         }
     }
     Ok((count, points))
+}
+
+/// As `stream`, turns decoded side by side while the next half megabyte is read.
+fn abreast(paths: &[PathBuf], threads: usize) -> Outcome {
+    let report = scan(paths, HEAD)?;
+    let reader = Abreast::<PointCloud<Sensor>>::new(&report, &SweepOptions::default())?;
+    let mut reader = reader.ok_or("turns of this sensor cannot be decoded apart")?;
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
+    let (mut set, mut count, mut points) = (CaptureSet::open(paths)?, 0, 0);
+    let [mut batch, mut ahead] = [DatagramBatch::default(), DatagramBatch::default()];
+    loop {
+        let fill = || fill(&mut set, &mut ahead);
+        let (read, ()) = pool.install(|| rayon::join(fill, || reader.push(&batch)));
+        count += read?;
+        if ahead.is_empty() {
+            pool.install(|| reader.finish());
+        }
+        while let Some(sweep) = reader.pop() {
+            points += sweep.cloud.len() as u64;
+            reader.recycle(sweep.lidar, sweep.cloud);
+        }
+        if ahead.is_empty() {
+            return Ok((count, points));
+        }
+        std::mem::swap(&mut batch, &mut ahead);
+    }
+}
+
+/// Reads the next datagrams, none behind the last.
+fn fill(set: &mut CaptureSet, batch: &mut DatagramBatch) -> Result<u64, FileError> {
+    batch.clear();
+    let mut count = 0;
+    while batch.bytes() < BATCH_BYTES
+        && let Some(datagram) = set.next()?
+    {
+        batch.push(&datagram);
+        count += 1;
+    }
+    Ok(count)
 }

@@ -3,7 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use lidar_deflect_core::capture::{DatagramReader, Format};
+use lidar_deflect_core::capture::{DatagramBatch, DatagramReader, Format};
+use lidar_deflect_core::cloud::PointCloud;
+use lidar_deflect_core::frame::Sensor;
+use lidar_deflect_core::stream::{Abreast, Reading, Scan, ScanOptions, SweepOptions, SweepReader};
+use lidar_deflect_core::sweep::Sweep;
 use lidar_deflect_files::CaptureSet;
 
 /// Source address, destination port and payload length.
@@ -161,4 +165,47 @@ fn the_reader_of_the_core_agrees() {
     lengths.sort_unstable();
     assert_eq!(lengths, [48, 48, 12_608, 16_640]);
     assert_eq!(reader.fragments().datagrams, 2);
+}
+
+/// Sweeps of a whole capture, written out: decoded packet by packet, and turn by turn side by side.
+fn sweeps_both_ways(path: &Path) -> Option<[Vec<String>; 2]> {
+    let mut batch = DatagramBatch::default();
+    let mut set = CaptureSet::open(&[path.to_path_buf()]).unwrap();
+    let mut scan = Scan::new(ScanOptions::default());
+    while let Some(datagram) = set.next().unwrap() {
+        scan.push(&datagram);
+        batch.push(&datagram);
+    }
+    let (report, options) = (scan.finish(), SweepOptions::default());
+    let mut one = SweepReader::new(&report, &options).ok()?;
+    batch.iter().for_each(|datagram| one.push(&datagram));
+    one.finish();
+    let mut many = Abreast::<PointCloud<Sensor>>::new(&report, &options).unwrap()?;
+    many.push(&batch);
+    many.finish();
+    assert_eq!(many.is_done(), one.is_done());
+    let written = |sweep: Sweep| format!("{sweep:?}");
+    Some([
+        std::iter::from_fn(|| one.pop()).map(written).collect(),
+        std::iter::from_fn(|| many.pop()).map(written).collect(),
+    ])
+}
+
+/// Whatever the sensor, and whatever its packets have in common.
+#[test]
+fn turns_decoded_side_by_side_are_those_of_one_thread() {
+    let Some(folder) = captures() else { return };
+    let (mut compared, mut seen) = (0, 0);
+    for expected in manifest(&folder) {
+        let Some([one, many]) = sweeps_both_ways(&folder.join(&expected.file)) else {
+            continue; // needs a file of the unit
+        };
+        assert!(one == many, "{}", expected.file);
+        compared += 1;
+        seen += one.len();
+    }
+    assert!(
+        compared >= 8 && seen > 40,
+        "{compared} captures, {seen} sweeps"
+    );
 }

@@ -15,6 +15,7 @@ pub mod leishen;
 pub mod livox;
 mod models;
 pub mod ouster;
+pub mod part;
 pub mod points;
 pub mod proof;
 pub mod robosense;
@@ -405,6 +406,14 @@ pub struct Decoded {
 }
 
 impl Decoded {
+    /// None yet; all columns, or those that [`Decoded::is_slim`] names.
+    pub fn with_columns(is_slim: bool) -> Self {
+        Self {
+            is_slim,
+            ..Self::default()
+        }
+    }
+
     /// Number of the first return, from number `from` on, that was shot after the rotor had turned by
     /// `turned_rad` since the first shot of the packet with this head.
     pub fn before(&self, from: usize, head: &Head, turned_rad: f64) -> usize {
@@ -441,6 +450,11 @@ pub trait Decoder: Send + Sync {
         out: &mut Decoded,
     ) {
         self.decode(payload, place, out);
+    }
+
+    /// Whether what it makes of a packet depends on the packets before.
+    fn is_following(&self) -> bool {
+        false
     }
 
     /// Whether a return of `payload` may lie in a direction within `bearings`, counted from x towards y,

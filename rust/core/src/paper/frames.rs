@@ -10,7 +10,7 @@ use crate::cloud::PointCloud;
 use crate::error::InvalidValue;
 use crate::frame::Sensor;
 use crate::stand::Stands;
-use crate::sweep::{Gap, Kept, Sweep};
+use crate::sweep::{Gap, Gathered, Kept, Sweep};
 use crate::time::Timestamp;
 
 /// A packet that is missing this close to the blade's first or last shot may have held its edge:
@@ -164,7 +164,9 @@ impl Kept for ShareEchoes {
             .extend_from_slice(&from.time_ns[places.clone()]);
         self.ring.extend_from_slice(&from.ring[places]);
     }
+}
 
+impl Gathered for ShareEchoes {
     fn count(&self) -> usize {
         self.xyz_m.len()
     }

@@ -6,7 +6,7 @@ use super::StreamInfo;
 use super::beside::Taker;
 use crate::cloud::{PointCloud, in_degrees};
 use crate::frame::Sensor;
-use crate::sweep::{Kept, Sweep};
+use crate::sweep::{Gathered, Kept, Sweep};
 use crate::time::Timestamp;
 
 /// Echoes of one lidar in the order of the shots, sensor frame.
@@ -63,7 +63,9 @@ impl Kept for HoldEchoes {
         self.intensity
             .extend(intensity.map(|seen| f32::from(*seen)));
     }
+}
 
+impl Gathered for HoldEchoes {
     fn count(&self) -> usize {
         self.xyz_m.len()
     }

@@ -3,11 +3,13 @@
 //! A capture is read twice: [`Scan`] finds the lidars by the content of their packets, counts what
 //! arrived and judges their clocks; [`SweepReader`] then turns the same datagrams into sweeps.
 
+mod abreast;
 mod arrivals;
 mod beside;
 mod both;
 mod cut;
 mod hold;
+mod intake;
 mod keys;
 mod lidar;
 mod points;
@@ -15,6 +17,9 @@ mod probe;
 mod reader;
 mod report;
 mod scan;
+mod sweeps;
+mod undecoded;
+mod workshop;
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -24,6 +29,7 @@ use crate::error::InvalidValue;
 use crate::packet::unit::UnitFile;
 use crate::packet::{ModelRef, pieces, unit_models};
 
+pub use abreast::Abreast;
 pub use beside::{Beside, Reading, Taker};
 pub use both::{Both, BothBeside};
 pub use cut::CaptureCut;
@@ -32,6 +38,7 @@ pub use points::{PointBlock, PointReader, PointTagger};
 pub use reader::{Reader, Sink, SweepOptions, SweepReader};
 pub use report::{Health, OtherStream, Pause, PositionFacts, ScanReport, StreamInfo};
 pub use scan::Scan;
+pub use sweeps::{Sweeps, sweeps};
 
 /// A source address and a destination port; with a source port where two sensors share them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

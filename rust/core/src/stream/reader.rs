@@ -2,18 +2,14 @@
 
 use std::collections::VecDeque;
 
-use super::arrivals::{Arrival, Arrivals, Ordered, mark};
-use super::report::{Pause, ScanReport, StreamInfo};
-use super::{ScanOptions, StreamKey, packets};
+use super::intake::{Intakes, Ready};
+use super::report::{ScanReport, StreamInfo};
 use crate::angle::Arc;
 use crate::capture::Datagram;
-use crate::clock::ClockModel;
 use crate::drops::Drops;
-use crate::error::{InvalidValue, ReadError, UnitError};
-use crate::loss::view::FieldOfView;
-use crate::packet::split::Following;
-use crate::packet::{Decoded, Decoder, ModelRef, PacketKind, Place};
-use crate::sweep::{Kept, Placed, Sweep, SweepCutter};
+use crate::error::{ReadError, UnitError};
+use crate::packet::{Decoded, Decoder};
+use crate::sweep::{Gathered, Kept, Placed, Sweep, SweepCutter};
 use crate::time::Timestamp;
 
 /// Which sweeps to make.
@@ -112,34 +108,16 @@ pub type SweepReader = Reader<SweepCutter>;
 
 /// Decodes the datagrams of a capture that was scanned; what becomes of the returns is up to `S`.
 pub struct Reader<S: Sink> {
-    options: ScanOptions,
-    lanes: Vec<Lane<S>>, // few: looked through for every datagram
+    intakes: Intakes,
+    lanes: Vec<Lane<S>>,
     pub(super) out: S::Out,
     decoded: Decoded,
-    limits: Limits,
-    pauses: Vec<Pause>,
-}
-
-#[derive(Clone, Copy)]
-struct Limits {
-    start: Option<Timestamp>,
-    stop: Option<Timestamp>,
 }
 
 struct Lane<S> {
-    key: StreamKey,
     number: usize,
-    model: ModelRef,
-    is_named: bool,
-    arrivals: Arrivals<Vec<u8>>,
     decoder: Box<dyn Decoder>,
-    clock: ClockModel,
-    view: FieldOfView,
     sink: S,
-    spare: Vec<Vec<u8>>,
-    /// A packet whose last firing may go on in the next one.
-    held: Option<(Ordered, Vec<u8>)>,
-    is_done: bool,
 }
 
 impl<S: Sink> Reader<S> {
@@ -149,70 +127,37 @@ impl<S: Sink> Reader<S> {
     /// [`ReadError`] for a lidar that the report does not have, or one that cannot be decoded with what
     /// is known of its unit.
     pub fn new(report: &ScanReport, options: &SweepOptions) -> Result<Self, ReadError> {
-        let all: Vec<usize> = (0..report.lidars.len()).collect();
-        let mut lanes: Vec<Lane<S>> = Vec::new();
-        for number in options.lidars.as_ref().unwrap_or(&all) {
-            let info = report.lidars.get(*number).ok_or_else(|| InvalidValue {
-                name: "lidar",
-                expected: format!("a number below {}", report.lidars.len()),
-                found: number.to_string(),
-            })?;
-            if lanes.iter().all(|lane| lane.number != *number) {
-                lanes.push(Lane::new(*number, info, options)?);
-            }
-        }
+        let intakes = Intakes::new(report, options)?;
+        let lane = |number: usize| Lane::new(number, &report.lidars[number], options);
         Ok(Self {
-            options: report.options.clone(),
-            lanes,
+            lanes: intakes.numbers().map(lane).collect::<Result<_, _>>()?,
+            intakes,
             out: S::Out::default(),
-            decoded: Decoded {
-                is_slim: S::IS_SLIM,
-                ..Decoded::default()
-            },
-            limits: Limits {
-                start: options.start,
-                stop: options.stop,
-            },
-            pauses: report.pauses.clone(),
+            decoded: Decoded::with_columns(S::IS_SLIM),
         })
     }
 
     /// Takes the next datagram.
     pub fn push(&mut self, datagram: &Datagram<'_>) {
-        let key = self.options.key(datagram);
-        let Some(lane) = self.lanes.iter_mut().find(|lane| lane.key == key) else {
-            return;
-        };
-        let mut step = Step {
-            decoded: &mut self.decoded,
-            out: &mut self.out,
-            limits: self.limits,
-            pauses: &self.pauses,
-        };
-        for packet in packets(datagram) {
-            if !lane.is_done && lane.is_data(packet.payload) {
-                lane.push(&packet, &mut step);
-            }
-        }
+        let (decoded, out) = (&mut self.decoded, &mut self.out);
+        self.intakes.push(datagram, |place, packet| {
+            self.lanes[place].read(packet, decoded, out);
+        });
     }
 
     /// Whether all lidars have passed the end that was asked for, so that reading on is no use.
     pub fn is_done(&self) -> bool {
-        self.lanes.iter().all(|lane| lane.is_done)
+        self.intakes.is_done()
     }
 
     /// The capture has ended: what waits and the sweeps that are not complete come out.
     pub fn finish(&mut self) {
-        let mut step = Step {
-            decoded: &mut self.decoded,
-            out: &mut self.out,
-            limits: self.limits,
-            pauses: &self.pauses,
-        };
-        let mut lanes: Vec<&mut Lane<S>> = self.lanes.iter_mut().collect();
-        lanes.sort_by_key(|lane| lane.number);
-        for lane in lanes {
-            lane.finish(&mut step);
+        for place in self.intakes.places() {
+            let lane = &mut self.lanes[place];
+            let (decoded, out) = (&mut self.decoded, &mut self.out);
+            self.intakes
+                .finish(place, |packet| lane.read(packet, decoded, out));
+            lane.sink.finish(out);
         }
     }
 
@@ -227,130 +172,25 @@ impl<S: Sink> Reader<S> {
     }
 }
 
-/// What a lane borrows of the reader.
-struct Step<'a, Out> {
-    decoded: &'a mut Decoded,
-    out: &'a mut Out,
-    limits: Limits,
-    pauses: &'a [Pause],
-}
-
 impl<S: Sink> Lane<S> {
     fn new(number: usize, info: &StreamInfo, options: &SweepOptions) -> Result<Self, UnitError> {
-        let visible_rad = std::f64::consts::TAU - info.view.blind_rad();
         Ok(Self {
-            key: info.key,
             number,
-            model: info.model,
-            is_named: info.is_named,
-            arrivals: Arrivals::new(info.model),
             decoder: info.model.fit(&info.unit)?.decoder,
-            clock: info.clock.clone(),
-            view: info.view.clone(),
-            sink: S::new(number, visible_rad, options),
-            spare: Vec::new(),
-            held: None,
-            is_done: false,
+            sink: S::new(number, info.visible_rad(), options),
         })
     }
 
-    fn is_data(&self, payload: &[u8]) -> bool {
-        if self.is_named {
-            self.model.fits(payload)
-        } else {
-            self.model.recognise(payload) == Some(PacketKind::Data)
+    fn read(&mut self, packet: &Ready<'_>, decoded: &mut Decoded, out: &mut S::Out) {
+        if packet.is_early {
+            return self.sink.skip(&packet.placed);
         }
-    }
-
-    fn push(&mut self, datagram: &Datagram<'_>, step: &mut Step<'_, S::Out>) {
-        let payload = datagram.payload;
-        let Some(head) = self.model.head(payload) else {
-            return;
-        };
-        let spare = &mut self.spare;
-        let keep = || {
-            let mut copy = spare.pop().unwrap_or_default();
-            copy.clear();
-            copy.extend_from_slice(payload);
-            copy
-        };
-        let (_, what) = self
-            .arrivals
-            .offer(datagram.time, &head, mark(payload), keep);
-        if let Arrival::Next(ordered) = what {
-            self.take(&ordered, payload, step);
+        decoded.clear();
+        let meets = |bearings: Arc| self.decoder.may_meet(packet.payload, bearings);
+        if self.sink.wants(&packet.placed, &meets) {
+            packet.decode(&mut *self.decoder, decoded);
         }
-        self.drain(step);
-    }
-
-    fn drain(&mut self, step: &mut Step<'_, S::Out>) {
-        while let Some((ordered, payload)) = self.arrivals.pop() {
-            self.take(&ordered, &payload, step);
-            self.spare.push(payload);
-        }
-    }
-
-    fn take(&mut self, ordered: &Ordered, payload: &[u8], step: &mut Step<'_, S::Out>) {
-        if !self.model.is_splitting() {
-            return self.read(ordered, payload, None, step);
-        }
-        let mut copy = self.spare.pop().unwrap_or_default();
-        copy.clear();
-        copy.extend_from_slice(payload);
-        if let Some((before, earlier)) = self.held.replace((*ordered, copy)) {
-            let packet = ordered.ticket.packet;
-            let following = ordered.follows().then_some(Following { payload, packet });
-            self.read(&before, &earlier, following, step);
-            self.spare.push(earlier);
-        }
-    }
-
-    fn read(
-        &mut self,
-        ordered: &Ordered,
-        payload: &[u8],
-        following: Option<Following<'_>>,
-        step: &mut Step<'_, S::Out>,
-    ) {
-        let ticket = &ordered.ticket;
-        let time = self.clock.utc(ordered.segment, ticket.device);
-        if self.is_done || step.limits.stop.is_some_and(|stop| time >= stop) {
-            // The clock only goes back at a jump; a packet behind it would be of another time.
-            self.is_done = true;
-            return;
-        }
-        let gap = ordered.gap.as_ref();
-        let placed = Placed {
-            time,
-            head: ticket.head,
-            frame_id: self.model.frame_id(payload),
-            lost: gap.map_or(0, |gap| gap.lost_in(&self.view, step.pauses)),
-            is_jump: ordered.is_jump,
-        };
-        if step.limits.start.is_some_and(|start| time < start) {
-            return self.sink.skip(&placed);
-        }
-        step.decoded.clear();
-        let place = Place {
-            time,
-            packet: ticket.packet,
-            mean_rate_rad_per_ns: ticket.mean_rate_rad_per_ns,
-        };
-        let meets = |bearings: Arc| self.decoder.may_meet(payload, bearings);
-        if self.sink.wants(&placed, &meets) {
-            self.decoder
-                .decode_before(payload, following, place, step.decoded);
-        }
-        self.sink.push(&placed, step.decoded, step.out);
-    }
-
-    fn finish(&mut self, step: &mut Step<'_, S::Out>) {
-        self.arrivals.flush();
-        self.drain(step);
-        if let Some((last, payload)) = self.held.take() {
-            self.read(&last, &payload, None, step);
-        }
-        self.sink.finish(step.out);
+        self.sink.push(&packet.placed, decoded, out);
     }
 }
 
@@ -382,15 +222,22 @@ impl<S: Sink> Reader<S> {
     }
 }
 
+impl<K: Gathered> SweepCutter<K> {
+    /// Cuts the turns of a lidar that sends `visible_rad` of each as `options` ask for.
+    pub(super) fn of(lidar: usize, visible_rad: f64, options: &SweepOptions) -> Self {
+        let every = options.every.get(lidar).copied().unwrap_or(1);
+        let bearings = options.bearings.get(lidar).copied().flatten();
+        Self::new(lidar, options.cut_rad(lidar), visible_rad, every).within(bearings)
+    }
+}
+
 impl<K: Kept> Sink for SweepCutter<K> {
     type Out = VecDeque<Sweep<K>>;
 
     const IS_SLIM: bool = K::IS_SLIM;
 
     fn new(lidar: usize, visible_rad: f64, options: &SweepOptions) -> Self {
-        let every = options.every.get(lidar).copied().unwrap_or(1);
-        let bearings = options.bearings.get(lidar).copied().flatten();
-        SweepCutter::new(lidar, options.cut_rad(lidar), visible_rad, every).within(bearings)
+        Self::of(lidar, visible_rad, options)
     }
 
     fn wants(&mut self, packet: &Placed, meets: &dyn Fn(Arc) -> bool) -> bool {

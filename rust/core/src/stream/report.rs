@@ -235,6 +235,11 @@ impl StreamInfo {
         self.points as f64 * (length_ns as f64 / whole_ns).clamp(0.0, 1.0)
     }
 
+    /// Angle of the turn that it sends.
+    pub fn visible_rad(&self) -> f64 {
+        std::f64::consts::TAU - self.view.blind_rad()
+    }
+
     fn is_splittable(&self) -> bool {
         let busy = self
             .source_ports

@@ -5,8 +5,20 @@ use std::ops::Range;
 use crate::cloud::PointCloud;
 use crate::frame::Sensor;
 
+/// What is gathered of a turn.
+pub trait Gathered: Default + Send {
+    /// How much was gathered.
+    fn count(&self) -> usize;
+
+    /// Makes room for so much more.
+    fn make_room(&mut self, additional: usize);
+
+    /// Forgets it and keeps the memory.
+    fn empty(&mut self);
+}
+
 /// Columns that returns are taken into.
-pub trait Kept: Default + Send {
+pub trait Kept: Gathered {
     /// No other columns than places, instants, azimuths and beams are taken: see [`Decoded::is_slim`].
     ///
     /// [`Decoded::is_slim`]: crate::packet::Decoded::is_slim
@@ -14,15 +26,6 @@ pub trait Kept: Default + Send {
 
     /// Takes the returns at these places, which the cloud has.
     fn take(&mut self, from: &PointCloud<Sensor>, places: Range<usize>);
-
-    /// How many were taken.
-    fn count(&self) -> usize;
-
-    /// Makes room for so many more.
-    fn make_room(&mut self, additional: usize);
-
-    /// Forgets them and keeps the memory.
-    fn empty(&mut self);
 }
 
 impl Kept for PointCloud<Sensor> {
@@ -31,7 +34,9 @@ impl Kept for PointCloud<Sensor> {
     fn take(&mut self, from: &PointCloud<Sensor>, places: Range<usize>) {
         self.extend(from, places);
     }
+}
 
+impl Gathered for PointCloud<Sensor> {
     fn count(&self) -> usize {
         self.len()
     }

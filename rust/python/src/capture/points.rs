@@ -94,9 +94,9 @@ impl PointIterator {
 fn columns(py: Python<'_>, block: PointBlock) -> PyResult<Bound<'_, PyDict>> {
     let columns = PyDict::new(py);
     let points = block.lidar.len();
-    let azimuth_deg = block.cloud.azimuth_deg();
-    let return_kind = block.cloud.return_kind_codes();
-    let cloud = block.cloud;
+    let mut cloud = block.cloud;
+    let azimuth_deg = cloud.take_azimuth_deg();
+    let return_kind = cloud.take_return_kind_codes();
     let xyz = cloud.xyz_m.into_flattened().into_pyarray(py);
     columns.set_item("time_ns", cloud.time_ns.into_pyarray(py))?;
     columns.set_item("lidar", block.lidar.into_pyarray(py))?;

@@ -62,8 +62,10 @@ impl<R: Reading> ReadingFeed<R> {
             None => pool_of(threads)?,
         };
         let own = pool.insert(own);
-        feed.batch(py, own, progress, ahead, || reading.push(batch))?;
+        let read = feed.batch(py, own, progress, ahead, || reading.push(batch));
+        // Also where Ctrl-C came: who goes on all the same misses nothing.
         std::mem::swap(batch, ahead);
+        read?;
         let is_done = reading.is_done();
         if is_done {
             feed.stop();

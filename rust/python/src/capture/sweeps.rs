@@ -1,13 +1,17 @@
 //! Sweeps as objects with numpy columns that own the memory of the core's columns.
 
-use lidar_deflect_core::stream::{SweepOptions, SweepReader};
+use std::sync::{Mutex, PoisonError};
+
+use lidar_deflect_core::cloud::PointCloud;
+use lidar_deflect_core::frame;
+use lidar_deflect_core::stream::{SweepOptions, Sweeps, sweeps};
 use lidar_deflect_core::sweep::Sweep as CoreSweep;
 use lidar_deflect_core::time::Timestamp;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 use super::CaptureScan;
-use super::feed::{Feed, Want};
+use super::reading::ReadingFeed;
 use crate::error::BorderResult;
 
 /// One turn of one lidar.
@@ -53,10 +57,10 @@ pub struct Sweep {
 
 impl Sweep {
     fn new(py: Python<'_>, lidar: String, sweep: CoreSweep) -> PyResult<Self> {
-        let points = sweep.cloud.len();
-        let azimuth_deg = sweep.cloud.azimuth_deg();
-        let return_kind = sweep.cloud.return_kind_codes();
-        let cloud = sweep.cloud;
+        let mut cloud = sweep.cloud;
+        let points = cloud.len();
+        let azimuth_deg = cloud.take_azimuth_deg();
+        let return_kind = cloud.take_return_kind_codes();
         let xyz = cloud.xyz_m.into_flattened().into_pyarray(py);
         Ok(Self {
             lidar,
@@ -94,14 +98,14 @@ impl Sweep {
     }
 }
 
+type SweepFeed = ReadingFeed<Box<dyn Sweeps<PointCloud<frame::Sensor>>>>;
+
 /// Reads a capture and gives its sweeps one by one.
 #[pyclass(module = "lidar_deflect._native")]
 pub struct SweepIterator {
-    feed: Feed,
-    reader: SweepReader,
+    feed: Mutex<SweepFeed>, // never locked: what waits for other threads is of one thread
     names: Vec<String>,
     progress: Option<Py<PyAny>>,
-    is_finished: bool,
 }
 
 #[pymethods]
@@ -132,12 +136,11 @@ impl SweepIterator {
             stop: stop_ns.map(Timestamp),
             ..SweepOptions::default()
         };
+        let reading = sweeps(&scan.report, &options)?;
         Ok(Self {
-            feed: Feed::open(py, &scan.paths)?,
-            reader: SweepReader::new(&scan.report, &options)?,
+            feed: Mutex::new(ReadingFeed::open(py, &scan.paths, reading)?),
             names,
             progress,
-            is_finished: false,
         })
     }
 
@@ -146,36 +149,23 @@ impl SweepIterator {
     }
 
     fn __next__(&mut self, py: Python<'_>) -> BorderResult<Option<Sweep>> {
+        let feed = self.feed.get_mut().unwrap_or_else(PoisonError::into_inner);
         loop {
-            if let Some(sweep) = self.reader.pop() {
+            if let Some(sweep) = feed.reading.pop() {
                 let name = self.names.get(sweep.lidar).cloned().unwrap_or_default();
                 return Ok(Some(Sweep::new(py, name, sweep)?));
             }
-            if self.is_finished {
+            if feed.has_ended() {
                 return Ok(None);
             }
-            let reader = &mut self.reader;
-            let progress = self.progress.as_ref();
-            let goes_on = self.feed.block(py, progress, |datagram| {
-                reader.push(datagram);
-                if reader.is_done() {
-                    Want::Stop
-                } else if reader.has_ready() {
-                    Want::Pause
-                } else {
-                    Want::More
-                }
-            })?;
-            if !goes_on {
-                py.detach(|| self.reader.finish());
-                self.is_finished = true;
-            }
+            feed.read_on(py, None, self.progress.as_ref())?;
         }
     }
 
     /// Second returns that were merged into the first so far.
     #[getter]
-    fn merged(&self) -> u64 {
-        self.reader.merged()
+    fn merged(&mut self) -> u64 {
+        let feed = self.feed.get_mut().unwrap_or_else(PoisonError::into_inner);
+        feed.reading.merged()
     }
 }

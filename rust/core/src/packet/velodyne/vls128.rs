@@ -257,6 +257,10 @@ impl Vls128Decoder {
 }
 
 impl Decoder for Vls128Decoder {
+    fn is_following(&self) -> bool {
+        true
+    }
+
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
         let Some(packet) = Packet::new(payload) else {
             return out.drops.add("packet_size", 1);
