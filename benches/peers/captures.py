@@ -22,9 +22,11 @@ def yard() -> Path:
 
 
 def single() -> Path:
-    """Capture of the first of its lidars alone."""
+    """Capture of the first of its lidars alone, two minutes of it."""
     scene = scenes.demo()
-    return _made("single", scene.model_copy(update={"lidars": scene.lidars[:1]})) / "capture.pcap"
+    loading = scene.loading.model_copy(update={"hold_s": 25.0})
+    alone = scene.model_copy(update={"lidars": scene.lidars[:1], "loading": loading})
+    return _made("alone", alone) / "capture.pcap"
 
 
 def _made(name: str, scene: scenes.Scene) -> Path:

@@ -29,7 +29,8 @@ ELEVATION_RAD = np.radians(
 )
 PACKET_BYTES = 1206
 PYTHON, RUST = "capture.sweeps(), all columns", "scan and sweeps in Rust, one thread"
-STREAM, LIMIT = "sweeps in Rust after a look at the head", "memcpy of the file"
+STREAM, TWO = "sweeps in Rust after a look at the head", "the same on two threads"
+LIMIT = "memcpy of the file"
 DECODER, NUMPY, NUMBA = "velodyne-decoder, read_pcap", "numpy, positions", "numba, positions"
 
 
@@ -131,6 +132,7 @@ def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
         PYTHON: lambda: by_us(path),
         RUST: lambda: in_rust("sweeps", path),
         STREAM: lambda: in_rust("stream", path),
+        TWO: lambda: in_rust("two", path),
         LIMIT: copied(path),
     }
     timed = rounds(jobs, repeats)
@@ -139,11 +141,17 @@ def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
         print(f"  {name}: {job.result}")
     rates = [path.stat().st_size / timed[name].median_s / 1e6 for name in (STREAM, LIMIT)]
     print(f"  {rates[0]:.0f} MB/s of capture in Rust, {rates[1]:.0f} MB/s by memcpy")
-    return [
-        Row(f"VLP-16, {name}", f"{asked} x {peer}", f"{ratio(timed, peer, name):.1f}")
-        for name in (STREAM, RUST)
-        for asked, peer in ((30, DECODER), (2.2, NUMBA))
-    ] + [
-        Row("VLP-16 through Python", f"{asked} x {peer}", f"{ratio(timed, peer, PYTHON):.1f}")
-        for asked, peer in ((20, DECODER), (5, NUMPY))
-    ]
+    return (
+        [
+            Row(f"VLP-16, {name}", f"{asked} x {peer}", f"{ratio(timed, peer, name):.1f}")
+            for name in (STREAM, RUST)
+            for asked, peer in ((30, DECODER), (2.2, NUMBA))
+        ]
+        + [
+            Row(f"VLP-16, {TWO}", f"1.7 x {STREAM}", f"{ratio(timed, STREAM, TWO):.2f}"),
+        ]
+        + [
+            Row("VLP-16 through Python", f"{asked} x {peer}", f"{ratio(timed, peer, PYTHON):.1f}")
+            for asked, peer in ((20, DECODER), (5, NUMPY))
+        ]
+    )

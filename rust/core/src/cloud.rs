@@ -200,9 +200,9 @@ impl<F> PointCloud<F> {
 
     /// Takes the azimuths out, in degrees, [0, 360).
     pub fn take_azimuth_deg(&mut self) -> Vec<f32> {
-        // Consumed and not borrowed: the memory stays where it is.
-        let azimuth_rad = std::mem::take(&mut self.azimuth_rad).into_iter();
-        azimuth_rad.map(|rad| in_degrees(&rad)).collect()
+        let mut azimuth = std::mem::take(&mut self.azimuth_rad);
+        azimuth.iter_mut().for_each(|own| *own = in_degrees(own));
+        azimuth
     }
 
     /// Takes the meanings of the returns out as numbers: the place of each in the declaration of [`ReturnKind`].
@@ -249,6 +249,7 @@ impl<F> PointCloud<F> {
 }
 
 /// An azimuth in degrees as files and cells have it.
+#[inline]
 pub fn in_degrees(azimuth_rad: &f32) -> f32 {
     f64::from(*azimuth_rad).to_degrees() as f32
 }
