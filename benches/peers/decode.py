@@ -141,17 +141,16 @@ def measure(repeats: int, *, large: bool) -> list[Row]:  # noqa: ARG001
         print(f"  {name}: {job.result}")
     rates = [path.stat().st_size / timed[name].median_s / 1e6 for name in (STREAM, LIMIT)]
     print(f"  {rates[0]:.0f} MB/s of capture in Rust, {rates[1]:.0f} MB/s by memcpy")
-    return (
-        [
-            Row(f"VLP-16, {name}", f"{asked} x {peer}", f"{ratio(timed, peer, name):.1f}")
-            for name in (STREAM, RUST)
-            for asked, peer in ((30, DECODER), (2.2, NUMBA))
-        ]
-        + [
-            Row(f"VLP-16, {TWO}", f"1.7 x {STREAM}", f"{ratio(timed, STREAM, TWO):.2f}"),
-        ]
-        + [
-            Row("VLP-16 through Python", f"{asked} x {peer}", f"{ratio(timed, peer, PYTHON):.1f}")
-            for asked, peer in ((20, DECODER), (5, NUMPY))
-        ]
-    )
+    asked = [
+        (STREAM, 30, DECODER),
+        (STREAM, 2.2, NUMBA),
+        (RUST, 30, DECODER),
+        (RUST, 2.2, NUMBA),
+        (TWO, 1.7, STREAM),
+        (PYTHON, 20, DECODER),
+        (PYTHON, 5, NUMPY),
+    ]
+    return [
+        Row(f"VLP-16, {name}", f"{times} x {peer}", f"{ratio(timed, peer, name):.2f}")
+        for name, times, peer in asked
+    ]

@@ -7,7 +7,7 @@ use lidar_deflect_core::angle::Arc;
 use lidar_deflect_core::capture::DatagramBatch;
 use lidar_deflect_core::cloud::PointCloud;
 use lidar_deflect_core::frame::Sensor;
-use lidar_deflect_core::stream::{Beside, BothBeside, Reading, ScanOptions, SweepOptions, Taker};
+use lidar_deflect_core::stream::{Beside, Pair, Reading, ScanOptions, SweepOptions, Taker};
 use lidar_deflect_core::sweep::Sweep;
 use puck::{Puck, Sent, datagram, scan};
 
@@ -49,14 +49,13 @@ fn two_cuts_in_one_reading_give_the_sweeps_of_two() {
         read_through(&sent, &mut beside);
         beside.into_takers().next().unwrap().0
     });
-    let lidar = (
-        0,
-        (narrow(), Written::default()),
-        (thinned(), Written::default()),
-    );
-    let mut both = BothBeside::new(&report, [lidar]).unwrap();
+    let pair = Pair {
+        first: Written::default(),
+        second: Written::default(),
+    };
+    let mut both = Beside::new(&report, [(narrow().beside(thinned()), pair)]).unwrap();
     read_through(&sent, &mut both);
-    let (first, second) = both.takers().next().unwrap();
+    let Pair { first, second } = both.takers().next().unwrap();
     assert!(alone[0].len() > 15 && (5..9).contains(&alone[1].len()));
     assert_eq!(first.0, alone[0]);
     assert_eq!(second.0, alone[1]);

@@ -6,7 +6,7 @@ use crate::capture::DatagramBatch;
 use crate::error::{InvalidValue, ReadError};
 use crate::frame::WorldFromSensor;
 use crate::stand::{Move, Stands};
-use crate::stream::{Beside, BothBeside, Reading, ScanReport, SweepOptions, Taker};
+use crate::stream::{Beside, Pair, Reading, ScanReport, SweepOptions, Taker};
 use crate::sweep::Sweep;
 use crate::time::Timestamp;
 use crate::watch::WindowTaker;
@@ -66,7 +66,7 @@ pub struct FrameReader<L = Beside<ShareTaker>> {
 }
 
 /// Frames, and beside them windows of the same packets in which tripods are watched.
-pub type WatchedReader = FrameReader<BothBeside<ShareTaker, WindowTaker>>;
+pub type WatchedReader = FrameReader<Beside<Pair<ShareTaker, WindowTaker>>>;
 
 /// Makes shares of one lidar's sweeps.
 pub struct ShareTaker {
@@ -87,9 +87,9 @@ impl Shares for Beside<ShareTaker> {
     }
 }
 
-impl<B: Taker> Shares for BothBeside<ShareTaker, B> {
+impl<B: Taker> Shares for Beside<Pair<ShareTaker, B>> {
     fn shares(&mut self) -> impl Iterator<Item = &mut ShareTaker> {
-        self.takers().map(|takers| &mut takers.0)
+        self.takers().map(|pair| &mut pair.first)
     }
 }
 
@@ -116,14 +116,15 @@ impl WatchedReader {
     ) -> Result<Self, ReadError> {
         check_length("windows", windows.len(), plan.lidars.len())?;
         let takers = takers_of(plan)?.into_iter().zip(windows);
-        let lidars = plan.lidars.iter().zip(takers);
-        let lidars = lidars.map(|(lidar, (share, window))| (*lidar, share, window));
-        Self::of(plan, BothBeside::new(report, lidars)?)
+        let lidars = takers.map(|((options, first), (beside, second))| {
+            (options.beside(beside), Pair { first, second })
+        });
+        Self::of(plan, Beside::new(report, lidars)?)
     }
 
     /// What takes the windows of each lidar.
     pub fn windows(&mut self) -> impl Iterator<Item = &mut WindowTaker> {
-        self.lidars.takers().map(|takers| &mut takers.1)
+        self.lidars.takers().map(|pair| &mut pair.second)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::reader::Reader;
+use super::reader::{Reader, Sink};
 use super::{ScanReport, SweepOptions};
 use crate::capture::DatagramBatch;
 use crate::error::ReadError;
@@ -15,6 +15,26 @@ pub trait Taker: Send {
 
     /// Takes the next sweep, in order of time.
     fn take(&mut self, sweep: &Sweep<Self::Kept>);
+}
+
+/// What becomes of all that a reader of one lidar gives.
+pub trait Taking: Send {
+    /// What it is that the reader gives.
+    type Sink: Sink<Out: Send> + Send;
+
+    /// Takes what is ready.
+    fn take_from(&mut self, reader: &mut Reader<Self::Sink>);
+}
+
+impl<T: Taker> Taking for T {
+    type Sink = SweepCutter<T::Kept>;
+
+    fn take_from(&mut self, reader: &mut Reader<Self::Sink>) {
+        while let Some(sweep) = reader.pop() {
+            self.take(&sweep);
+            reader.recycle(sweep.lidar, sweep.cloud);
+        }
+    }
 }
 
 /// What batches of datagrams are read into.
@@ -30,16 +50,16 @@ pub trait Reading: Send {
 }
 
 /// Lidars side by side, each with its taker; what they take does not depend on the number of threads.
-pub struct Beside<T: Taker> {
+pub struct Beside<T: Taking> {
     lanes: Vec<Lane<T>>,
 }
 
-struct Lane<T: Taker> {
-    reader: Reader<SweepCutter<T::Kept>>,
+struct Lane<T: Taking> {
+    reader: Reader<T::Sink>,
     taker: T,
 }
 
-impl<T: Taker> Beside<T> {
+impl<T: Taking> Beside<T> {
     /// Prepares for the capture that `report` was made of: options and taker of each lidar.
     ///
     /// # Errors
@@ -69,12 +89,12 @@ impl<T: Taker> Beside<T> {
     }
 }
 
-impl<T: Taker> Reading for Beside<T> {
+impl<T: Taking> Reading for Beside<T> {
     fn push(&mut self, batch: &DatagramBatch) {
         self.lanes.par_iter_mut().for_each(|lane| {
             for datagram in batch.iter() {
                 lane.reader.push(&datagram);
-                lane.take();
+                lane.taker.take_from(&mut lane.reader);
             }
         });
     }
@@ -86,16 +106,7 @@ impl<T: Taker> Reading for Beside<T> {
     fn finish(&mut self) {
         self.lanes.par_iter_mut().for_each(|lane| {
             lane.reader.finish();
-            lane.take();
+            lane.taker.take_from(&mut lane.reader);
         });
-    }
-}
-
-impl<T: Taker> Lane<T> {
-    fn take(&mut self) {
-        while let Some(sweep) = self.reader.pop() {
-            self.taker.take(&sweep);
-            self.reader.recycle(sweep.lidar, sweep.cloud);
-        }
     }
 }

@@ -1,13 +1,8 @@
 //! Two kinds of sweeps of the same packets: cut elsewhere, of other turns and bearings, decoded once.
 
-use rayon::prelude::*;
-
-use super::beside::{Reading, Taker};
+use super::beside::{Taker, Taking};
 use super::reader::{Reader, Sink, SweepOptions};
-use super::report::ScanReport;
 use crate::angle::Arc;
-use crate::capture::DatagramBatch;
-use crate::error::ReadError;
 use crate::packet::Decoded;
 use crate::sweep::{Placed, SweepCutter};
 
@@ -79,84 +74,28 @@ impl<A: Sink, B: Sink> Sink for Both<A, B> {
     }
 }
 
-type BothCutters<A, B> = Both<SweepCutter<<A as Taker>::Kept>, SweepCutter<<B as Taker>::Kept>>;
-
-/// Lidars side by side as in [`super::Beside`], each with two takers of its sweeps.
-pub struct BothBeside<A: Taker, B: Taker> {
-    lanes: Vec<Lane<A, B>>,
+/// Two takers of one lidar, each of sweeps of its own: what [`SweepOptions::beside`] asks for is the second's.
+pub struct Pair<A, B> {
+    /// Takes the sweeps of the options themselves.
+    pub first: A,
+    /// Takes those that are wanted beside them.
+    pub second: B,
 }
 
-struct Lane<A: Taker, B: Taker> {
-    lidar: usize,
-    reader: Reader<BothCutters<A, B>>,
-    takers: (A, B),
-}
+impl<A: Taker, B: Taker> Taking for Pair<A, B> {
+    type Sink = Both<SweepCutter<A::Kept>, SweepCutter<B::Kept>>;
 
-impl<A: Taker, B: Taker> BothBeside<A, B> {
-    /// Prepares for the capture that `report` was made of: number, options and takers of each lidar.
-    /// The first options say from when to when packets are read.
-    ///
-    /// # Errors
-    /// [`ReadError`] where a lidar cannot be decoded.
-    pub fn new(
-        report: &ScanReport,
-        lidars: impl IntoIterator<Item = (usize, (SweepOptions, A), (SweepOptions, B))>,
-    ) -> Result<Self, ReadError> {
-        let lane = |(lidar, (options, first), (beside, second))| {
-            let options: SweepOptions = options;
-            let reader = Reader::new(report, &options.beside(beside))?;
-            Ok(Lane {
-                lidar,
-                reader,
-                takers: (first, second),
-            })
-        };
-        let lanes = lidars.into_iter().map(lane);
-        Ok(Self {
-            lanes: lanes.collect::<Result<_, ReadError>>()?,
-        })
-    }
-
-    /// The takers of each lidar, in the order in which they were given.
-    pub fn takers(&mut self) -> impl Iterator<Item = &mut (A, B)> {
-        self.lanes.iter_mut().map(|lane| &mut lane.takers)
-    }
-}
-
-impl<A: Taker, B: Taker> Reading for BothBeside<A, B> {
-    fn push(&mut self, batch: &DatagramBatch) {
-        self.lanes.par_iter_mut().for_each(|lane| {
-            for datagram in batch.iter() {
-                lane.reader.push(&datagram);
-                lane.take();
-            }
-        });
-    }
-
-    fn is_done(&self) -> bool {
-        self.lanes.iter().all(|lane| lane.reader.is_done())
-    }
-
-    fn finish(&mut self) {
-        self.lanes.par_iter_mut().for_each(|lane| {
-            lane.reader.finish();
-            lane.take();
-        });
-    }
-}
-
-impl<A: Taker, B: Taker> Lane<A, B> {
-    fn take(&mut self) {
-        while let Some(sweep) = self.reader.out.0.pop_front() {
-            self.takers.0.take(&sweep);
-            if let Some(sink) = self.reader.sink_of(self.lidar) {
-                sink.first.sink.recycle(sweep.cloud);
+    fn take_from(&mut self, reader: &mut Reader<Self::Sink>) {
+        while let Some(sweep) = reader.out.0.pop_front() {
+            self.first.take(&sweep);
+            if let Some(both) = reader.sink_of(sweep.lidar) {
+                both.first.sink.recycle(sweep.cloud);
             }
         }
-        while let Some(sweep) = self.reader.out.1.pop_front() {
-            self.takers.1.take(&sweep);
-            if let Some(sink) = self.reader.sink_of(self.lidar) {
-                sink.second.sink.recycle(sweep.cloud);
+        while let Some(sweep) = reader.out.1.pop_front() {
+            self.second.take(&sweep);
+            if let Some(both) = reader.sink_of(sweep.lidar) {
+                both.second.sink.recycle(sweep.cloud);
             }
         }
     }

@@ -30,8 +30,8 @@ use crate::packet::unit::UnitFile;
 use crate::packet::{ModelRef, pieces, unit_models};
 
 pub use abreast::Abreast;
-pub use beside::{Beside, Reading, Taker};
-pub use both::{Both, BothBeside};
+pub use beside::{Beside, Reading, Taker, Taking};
+pub use both::{Both, Pair};
 pub use cut::CaptureCut;
 pub use hold::HoldEchoes;
 pub use points::{PointBlock, PointReader, PointTagger};
