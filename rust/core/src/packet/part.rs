@@ -13,6 +13,13 @@ pub struct Part {
     pub until_rad: Option<f64>,
 }
 
+impl Part {
+    /// Whether no cut lies in the packet.
+    pub fn is_whole(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
 impl Decoded {
     /// Which returns of the packet with this head belong to a part of it.
     pub fn places(&self, head: &Head, part: Part) -> Range<usize> {

@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use super::intake::Ready;
+use crate::cloud::PointCloud;
+use crate::frame::Sensor;
 use crate::packet::part::Part;
 use crate::packet::split::Following;
 use crate::packet::{Decoded, Decoder, Head, Place};
@@ -52,13 +54,32 @@ impl Undecoded {
     pub fn decode<K: Kept>(&self, decoder: &mut dyn Decoder, decoded: &mut Decoded, kept: &mut K) {
         for entry in &self.entries {
             let merged = decoded.merged;
-            decoded.clear();
-            self.decode_one(entry, decoder, decoded);
-            kept.take(&decoded.cloud, decoded.places(&entry.head, entry.part));
+            match kept.cloud().filter(|_| entry.part.is_whole()) {
+                Some(cloud) => self.decode_into(cloud, entry, decoder, decoded),
+                None => {
+                    decoded.clear();
+                    self.decode_one(entry, decoder, decoded);
+                    kept.take(&decoded.cloud, decoded.places(&entry.head, entry.part));
+                }
+            }
             if !entry.is_counted {
                 decoded.merged = merged;
             }
         }
+    }
+
+    /// Appends the returns of a packet where they stay, without a move of all columns.
+    fn decode_into(
+        &self,
+        cloud: &mut PointCloud<Sensor>,
+        entry: &Entry,
+        decoder: &mut dyn Decoder,
+        decoded: &mut Decoded,
+    ) {
+        decoded.encoder_rad.clear();
+        std::mem::swap(cloud, &mut decoded.cloud);
+        self.decode_one(entry, decoder, decoded);
+        std::mem::swap(cloud, &mut decoded.cloud);
     }
 
     fn decode_one(&self, entry: &Entry, decoder: &mut dyn Decoder, decoded: &mut Decoded) {

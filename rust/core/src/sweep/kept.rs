@@ -26,6 +26,11 @@ pub trait Kept: Gathered {
 
     /// Takes the returns at these places, which the cloud has.
     fn take(&mut self, from: &PointCloud<Sensor>, places: Range<usize>);
+
+    /// All columns, where nothing less is kept, for who can fill them itself.
+    fn cloud(&mut self) -> Option<&mut PointCloud<Sensor>> {
+        None
+    }
 }
 
 impl Kept for PointCloud<Sensor> {
@@ -33,6 +38,10 @@ impl Kept for PointCloud<Sensor> {
 
     fn take(&mut self, from: &PointCloud<Sensor>, places: Range<usize>) {
         self.extend(from, places);
+    }
+
+    fn cloud(&mut self) -> Option<&mut PointCloud<Sensor>> {
+        Some(self)
     }
 }
 
