@@ -12,6 +12,7 @@ mod reach;
 pub(super) mod rotation;
 mod rows;
 mod table;
+mod tally;
 pub mod vlp32;
 pub mod vls128;
 pub mod writer;
@@ -72,14 +73,16 @@ impl<'a> Packet<'a> {
         payload.try_into().ok().map(Self)
     }
 
+    #[inline(always)]
     fn block(&self, block: usize) -> &'a [u8] {
         let start = block % BLOCKS * field::BLOCK_LEN;
         &self.0[start..start + field::BLOCK_LEN]
     }
 
     /// Whether a block carries lasers 0 to 31.
+    #[inline(always)]
     pub fn is_lower(&self, block: usize) -> bool {
-        self.bank(block) == Some(0)
+        self.block(block)[field::FLAG] == [FLAG_FIRST, FLAG_BANKS[0]]
     }
 
     /// The bank of 32 lasers that a block carries; `None` where its flag is none.
@@ -96,6 +99,7 @@ impl<'a> Packet<'a> {
     }
 
     /// Azimuth of a block, 0.01 degree; 36000 and above are not valid.
+    #[inline(always)]
     pub fn azimuth_centideg(&self, block: usize) -> u16 {
         let bytes = &self.block(block)[field::AZIMUTH];
         u16::from_le_bytes([bytes[0], bytes[1]])
@@ -117,6 +121,14 @@ impl<'a> Packet<'a> {
             range: u16::from_le_bytes([bytes[3 * k], bytes[3 * k + 1]]),
             intensity: bytes[3 * k + 2],
         })
+    }
+
+    /// Bytes of the returns of a block, and to each the one that follows it in the packet.
+    #[inline(always)]
+    fn returns_and_next(&self, block: usize) -> (&'a [u8], &'a [u8]) {
+        let start = block % BLOCKS * field::BLOCK_LEN;
+        let place = |from: usize| from + field::RETURNS.start..from + field::RETURNS.end;
+        (&self.0[place(start)], &self.0[place(start + 1)])
     }
 
     /// Device time of the first shot, microseconds past the hour.

@@ -13,7 +13,7 @@ use crate::error::InvalidValue;
 use crate::packet::aim::{turn, wrapped};
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::echoes::judge;
-use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode};
 use crate::time::Timestamp;
 
 /// How a model fires.
@@ -79,27 +79,6 @@ impl Firing {
     }
 }
 
-/// Numbers of points in a data packet.
-pub fn tally(payload: &[u8]) -> Tally {
-    let Some(packet) = Packet::new(payload) else {
-        return Tally::default();
-    };
-    let mut tally = Tally::default();
-    let stride = packet.return_mode().returns();
-    let rows = (0..BLOCKS / stride).filter(|row| is_usable(&packet, *row, stride));
-    for block in rows.map(|row| row * stride) {
-        if stride == 1 {
-            let hits = packet.returns(block).filter(|echo| echo.range != 0);
-            tally.points += hits.count() as u32;
-            continue;
-        }
-        for (last, strongest) in packet.returns(block).zip(packet.returns(block + 1)) {
-            tally.add_pair(last.range, strongest.range);
-        }
-    }
-    tally
-}
-
 /// What a payload is to the models of one bank with the product bytes `products`.
 ///
 /// An HDL-64E may have any bytes there; its second block is of the second bank.
@@ -120,7 +99,8 @@ pub fn recognise_product(payload: &[u8], products: &[u8]) -> Option<PacketKind> 
 }
 
 /// Whether the blocks of a row have the flag and an azimuth within one turn.
-fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
+#[inline(always)]
+pub(super) fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
     let mut blocks = row * stride..(row + 1) * stride;
     blocks.all(|block| packet.is_lower(block))
         && packet.azimuth_centideg(row * stride) < TURN_CENTIDEG
