@@ -5,6 +5,7 @@
 mod calibration;
 pub mod hdl32e;
 pub mod hdl64e;
+mod hits;
 mod lanes;
 pub mod position;
 pub mod puck;
@@ -116,11 +117,20 @@ impl<'a> Packet<'a> {
 
     /// The same, all at once.
     pub fn echoes(&self, block: usize) -> [RawReturn; CHANNELS] {
-        let bytes = &self.block(block)[field::RETURNS];
+        let bytes = self.returns_of(block);
         std::array::from_fn(|k| RawReturn {
             range: u16::from_le_bytes([bytes[3 * k], bytes[3 * k + 1]]),
             intensity: bytes[3 * k + 2],
         })
+    }
+
+    /// Bytes of the returns of a block.
+    #[inline(always)]
+    fn returns_of(&self, block: usize) -> &'a [u8; CHANNELS * field::RETURN_LEN] {
+        let start = block % BLOCKS * field::BLOCK_LEN + field::RETURNS.start;
+        self.0[start..]
+            .first_chunk()
+            .expect("a block of the packet")
     }
 
     /// Bytes of the returns of a block, and to each the one that follows it in the packet.

@@ -3,7 +3,8 @@
 //! In dual return two blocks hold the same shots: the first the last returns, the second the
 //! strongest (or the second strongest where the last is the strongest).
 
-use super::lanes::{Lanes, Row};
+use super::hits::{Hits, Origin};
+use super::lanes::{Lanes, Placed, Row};
 use super::reach::Reach;
 use super::rotation::Rotation;
 use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
@@ -69,6 +70,8 @@ impl Firing {
             firing: *self,
             reach: Reach::new(&channels, self.row_ns()),
             lanes: Lanes::new(&channels, self.range_unit_m),
+            placed: Placed::default(),
+            hits: Hits::default(),
         }))
     }
 
@@ -138,6 +141,8 @@ struct RowsDecoder {
     firing: Firing,
     lanes: Lanes,
     reach: Reach,
+    placed: Placed,
+    hits: Hits,
 }
 
 impl Decoder for RowsDecoder {
@@ -148,26 +153,31 @@ impl Decoder for RowsDecoder {
         let rotation = self.firing.rotation(&packet, place.mean_rate_rad_per_ns);
         let mode = packet.return_mode();
         let stride = mode.returns();
-        self.lanes.set_rate(rotation.rate_rad_per_ns());
+        let (mut rows, mut count) = ([Row::default(); BLOCKS], 0);
         for row in 0..BLOCKS / stride {
             if !is_usable(&packet, row, stride) {
                 out.drops.add("block_invalid", stride as u64);
                 continue;
             }
-            let block = row * stride;
-            let row = Row {
+            rows[count] = Row {
                 azimuth_rad: rotation.azimuth_rad(row),
                 time_ns: (place.time + rotation.start_ns(row)).0,
-                packet: place.packet,
-                block: block as u16,
+                block: row * stride,
             };
-            let first = packet.echoes(block);
-            if stride == 1 {
-                self.lanes.push(row, &first, single_kind(mode), out);
-            } else {
-                let echoes = [&first, &packet.echoes(block + 1)];
-                self.lanes.push_pairs(row, echoes, out);
-            }
+            count += 1;
+        }
+        self.lanes.set_rate(rotation.rate_rad_per_ns());
+        self.lanes
+            .place(&packet, &rows[..count], stride, &mut self.placed);
+        let origin = Origin {
+            packet: place.packet,
+            ring: &self.lanes.ring,
+        };
+        if stride == 1 {
+            self.hits
+                .push_single(&self.placed, single_kind(mode), origin, out);
+        } else {
+            self.hits.push_pairs(&self.placed, origin, out);
         }
     }
 
