@@ -1,21 +1,21 @@
 //! Which shots of a packet hit, and their returns in columns.
 
-use super::lanes::{Column, Lane, Placed};
-use super::{BLOCKS, CHANNELS};
+use super::CHANNELS;
+use super::lanes::{Column, Lane, Placed, ROOM};
 use crate::cloud::ReturnKind;
 use crate::packet::echoes::{RawEcho, judge};
 use crate::packet::{Decoded, ReturnMode};
 
-/// Shots of a packet, and a power of two, so that places need no check.
-const ROOM: usize = (BLOCKS * CHANNELS).next_power_of_two();
+/// Shots that there is room for.
+const SHOTS: usize = ROOM * CHANNELS;
 
 /// The hits of a packet, in the order of its shots. Meant to be used again and again.
 pub struct Hits {
     count: usize,
     /// Among the placed shots.
-    places: [u16; ROOM],
+    places: [u16; SHOTS],
     /// Places among the returns of the shot, and what they are, where there are two.
-    meanings: [(u8, ReturnKind); ROOM],
+    meanings: [(u8, ReturnKind); SHOTS],
 }
 
 /// What all returns of a packet have in common.
@@ -31,8 +31,8 @@ impl Default for Hits {
     fn default() -> Self {
         Self {
             count: 0,
-            places: [0; ROOM],
-            meanings: [(0, ReturnKind::Strongest); ROOM],
+            places: [0; SHOTS],
+            meanings: [(0, ReturnKind::Strongest); SHOTS],
         }
     }
 }
@@ -46,7 +46,10 @@ impl Hits {
         origin: Origin<'_>,
         out: &mut Decoded,
     ) {
-        if placed.hits == CHANNELS * placed.blocks {
+        if placed.hits[..placed.blocks]
+            .iter()
+            .all(|hits| *hits == u32::MAX)
+        {
             keep_all(placed, origin, out);
         } else {
             self.find(placed);
@@ -75,11 +78,15 @@ impl Hits {
     }
 
     fn find(&mut self, placed: &Placed) {
-        let ranges = placed.raw_range[..placed.blocks].as_flattened();
         self.count = 0;
-        for (place, range) in (0..).zip(ranges) {
-            self.places[self.count % ROOM] = place;
-            self.count += usize::from(*range != 0);
+        for (block, hits) in placed.hits[..placed.blocks].iter().enumerate() {
+            let mut left = *hits;
+            while left != 0 {
+                let place = block * CHANNELS + left.trailing_zeros() as usize;
+                self.places[self.count % SHOTS] = place as u16;
+                self.count += 1;
+                left &= left - 1;
+            }
         }
     }
 
@@ -94,8 +101,8 @@ impl Hits {
                 for (echo, kind) in (0..2_u8).zip(kinds) {
                     let Some(kind) = kind else { continue };
                     let place = (block + usize::from(echo)) * CHANNELS + shot;
-                    self.places[self.count % ROOM] = place as u16;
-                    self.meanings[self.count % ROOM] = (echo, kind);
+                    self.places[self.count % SHOTS] = place as u16;
+                    self.meanings[self.count % SHOTS] = (echo, kind);
                     self.count += 1;
                 }
             }
@@ -105,8 +112,7 @@ impl Hits {
 
     /// Appends what all hits have, whatever they mean.
     fn keep(&self, placed: &Placed, origin: Origin<'_>, out: &mut Decoded) {
-        let places = &self.places[..self.count];
-        let cloud = &mut out.cloud;
+        let (places, cloud) = (&self.places[..self.count], &mut out.cloud);
         gather(&placed.encoder_rad, places, &mut out.encoder_rad);
         gather(&placed.xyz_m, places, &mut cloud.xyz_m);
         gather(&placed.time_ns, places, &mut cloud.time_ns);
@@ -135,7 +141,11 @@ impl Placed {
 
 fn gather<T: Copy>(column: &Column<T>, places: &[u16], out: &mut Vec<T>) {
     let shots = column.as_flattened();
-    out.extend(places.iter().map(|place| shots[usize::from(*place)]));
+    out.extend(
+        places
+            .iter()
+            .map(|place| shots[usize::from(*place) % SHOTS]),
+    );
 }
 
 /// Appends all placed shots.

@@ -10,8 +10,10 @@ use crate::simd::{Kernel, vectorized};
 
 /// One number per shot of a block.
 pub type Lane<T> = [T; CHANNELS];
+/// Blocks of a packet, and a power of two, so that no place needs a check.
+pub const ROOM: usize = BLOCKS.next_power_of_two();
 /// One number per shot of a packet.
-pub type Column<T> = [Lane<T>; BLOCKS];
+pub type Column<T> = [Lane<T>; ROOM];
 
 /// What decoding needs of the shots of a row, quantity by quantity.
 pub struct Lanes {
@@ -48,14 +50,14 @@ pub struct Row {
     pub block: usize,
 }
 
-/// The shots of the rows of a packet of which one hit at least, placed as if all of them had hit: block by block,
-/// without gaps. Meant to be used again and again.
+/// The shots of some rows of a packet, placed as if all of them had hit: block by block, without gaps. Meant to be
+/// used again and again.
 #[derive(Default)]
 pub struct Placed {
     /// Blocks that are there.
     pub blocks: usize,
-    /// Shots of them that hit.
-    pub hits: usize,
+    /// Which shots of each hit: a bit for each.
+    pub hits: [u32; ROOM],
     /// Ranges in the model's unit; 0 = no return.
     pub raw_range: Column<u16>,
     /// Brightness.
@@ -143,21 +145,13 @@ impl Kernel for Place<'_> {
     #[inline(always)]
     fn run(self) {
         let placed = self.placed;
-        (placed.blocks, placed.hits) = (0, 0);
+        placed.blocks = 0;
         for row in self.rows {
-            let first = placed.blocks;
-            let places = first..BLOCKS.min(first + self.returns);
-            let mut hits = 0;
-            for (place, block) in places.clone().zip(row.block..) {
-                hits += usize::from(placed.read(place, self.packet.returns_of(block)));
-                placed.block[place] = [block as u16; CHANNELS];
-            }
-            if hits == 0 {
-                continue; // written over by the next
-            }
-            placed.hits += hits;
             let sin_cos = row.azimuth_rad.sin_cos();
-            for place in places {
+            for block in row.block..row.block + self.returns {
+                let place = placed.blocks % ROOM;
+                placed.block[place] = [block as u16; CHANNELS];
+                placed.read(place, self.packet.returns_of(block));
                 placed.aim(place, self.lanes, row);
                 placed.reach(place, self.lanes, sin_cos);
                 placed.blocks += 1;
@@ -167,50 +161,60 @@ impl Kernel for Place<'_> {
 }
 
 impl Placed {
-    /// Takes the echoes of a block; gives how many have a range.
+    /// Takes the echoes of a block.
     #[inline(always)]
-    fn read(&mut self, place: usize, bytes: &[u8; 3 * CHANNELS]) -> u16 {
+    fn read(&mut self, place: usize, bytes: &[u8; 3 * CHANNELS]) {
         let (range, intensity) = (&mut self.raw_range[place], &mut self.intensity[place]);
-        let mut hits = 0_u16;
+        let mut hits = 0;
         for k in 0..CHANNELS {
             range[k] = u16::from(bytes[3 * k]) | u16::from(bytes[3 * k + 1]) << 8;
             intensity[k] = u16::from(bytes[3 * k + 2]);
-            hits = hits.wrapping_add(u16::from(range[k] != 0)); // no check: side by side
+            hits |= u32::from(range[k] != 0) << k;
         }
-        hits
+        self.hits[place] = hits;
     }
 
     /// When a block's shots are fired, and where to.
     #[inline(always)]
     fn aim(&mut self, place: usize, lanes: &Lanes, row: &Row) {
-        self.time_ns[place] = lanes.delay_ns.map(|delay| row.time_ns.wrapping_add(delay));
-        let encoder_rad = lanes.turn.turned_rad.map(|turned| row.azimuth_rad + turned);
-        self.encoder_rad[place] = encoder_rad.map(wrapped);
-        self.azimuth_rad[place] = if lanes.is_straight {
-            self.encoder_rad[place]
-        } else {
-            let offsets_rad = lanes.azimuth_offset_rad;
-            std::array::from_fn(|k| wrapped(encoder_rad[k] + offsets_rad[k]))
-        };
+        let time_ns = &mut self.time_ns[place];
+        for (time_ns, delay_ns) in time_ns.iter_mut().zip(&lanes.delay_ns) {
+            *time_ns = row.time_ns.wrapping_add(*delay_ns);
+        }
+        let encoder_rad = &mut self.encoder_rad[place];
+        for (encoder_rad, turned_rad) in encoder_rad.iter_mut().zip(&lanes.turn.turned_rad) {
+            *encoder_rad = wrapped(row.azimuth_rad + turned_rad);
+        }
+        if lanes.is_straight {
+            self.azimuth_rad[place] = self.encoder_rad[place];
+            return;
+        }
+        let shots = lanes.turn.turned_rad.iter().zip(&lanes.azimuth_offset_rad);
+        for (azimuth_rad, (turned_rad, offset_rad)) in self.azimuth_rad[place].iter_mut().zip(shots)
+        {
+            *azimuth_rad = wrapped(row.azimuth_rad + turned_rad + offset_rad);
+        }
     }
 
     /// How far they reach.
     #[inline(always)]
     fn reach(&mut self, place: usize, lanes: &Lanes, (row_sin, row_cos): (f64, f64)) {
+        let raw_range = self.raw_range[place];
+        let (mut ranges_m, mut xyz_m) = ([0.0; CHANNELS], [[0.0; 3]; CHANNELS]);
         for k in 0..CHANNELS {
             let (sin_by, cos_by) = (lanes.turn.sin[k], lanes.turn.cos[k]);
             let sin = row_sin * cos_by + row_cos * sin_by;
             let cos = row_cos * cos_by - row_sin * sin_by;
-            let raw_range = f64::from(self.raw_range[place][k]);
-            let range_m = raw_range * lanes.range_unit_m + lanes.range_offset_m[k];
+            let range_m = f64::from(raw_range[k]) * lanes.range_unit_m + lanes.range_offset_m[k];
             let level_m = range_m * lanes.cos_elevation[k];
             let height_m = range_m * lanes.sin_elevation[k] + lanes.vertical_offset_m[k];
-            self.range_m[place][k] = range_m as f32;
-            self.xyz_m[place][k] = [
+            ranges_m[k] = range_m as f32;
+            xyz_m[k] = [
                 (level_m * cos) as f32,
                 (-level_m * sin) as f32,
                 height_m as f32,
             ];
         }
+        (self.range_m[place], self.xyz_m[place]) = (ranges_m, xyz_m);
     }
 }

@@ -45,6 +45,12 @@ mod field {
 }
 
 /// First byte of the flags of all blocks; the second tells the bank of lasers.
+/// Which bytes of three words of eight returns belong to ranges.
+const RANGE_BYTES: [u64; 3] = [
+    0xFFFF_00FF_FF00_FFFF,
+    0xFF00_FFFF_00FF_FF00,
+    0x00FF_FF00_FFFF_00FF,
+];
 const FLAG_FIRST: u8 = 0xFF;
 /// Second bytes of the flags of lasers 0 to 31, 32 to 63, 64 to 95 and 96 to 127.
 const FLAG_BANKS: [u8; 4] = [0xEE, 0xDD, 0xCC, 0xBB];
@@ -131,6 +137,16 @@ impl<'a> Packet<'a> {
         self.0[start..]
             .first_chunk()
             .expect("a block of the packet")
+    }
+
+    /// Whether any shot of a block has a range.
+    #[inline(always)]
+    fn has_echoes(&self, block: usize) -> bool {
+        let (words, _) = self.returns_of(block).as_chunks::<8>();
+        let ranges = (words.iter().zip(RANGE_BYTES.iter().cycle())).fold(0, |any, (word, mask)| {
+            any | u64::from_le_bytes(*word) & mask
+        });
+        ranges != 0
     }
 
     /// Bytes of the returns of a block, and to each the one that follows it in the packet.

@@ -157,14 +157,14 @@ impl Decoder for RowsDecoder {
         for row in 0..BLOCKS / stride {
             if !is_usable(&packet, row, stride) {
                 out.drops.add("block_invalid", stride as u64);
-                continue;
+            } else if (row * stride..(row + 1) * stride).any(|block| packet.has_echoes(block)) {
+                rows[count] = Row {
+                    azimuth_rad: rotation.azimuth_rad(row),
+                    time_ns: (place.time + rotation.start_ns(row)).0,
+                    block: row * stride,
+                };
+                count += 1;
             }
-            rows[count] = Row {
-                azimuth_rad: rotation.azimuth_rad(row),
-                time_ns: (place.time + rotation.start_ns(row)).0,
-                block: row * stride,
-            };
-            count += 1;
         }
         self.lanes.set_rate(rotation.rate_rad_per_ns());
         self.lanes
