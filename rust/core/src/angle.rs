@@ -3,7 +3,12 @@
 use std::f64::consts::{PI, TAU};
 
 /// `angle_rad` brought into [0, 2 pi).
+#[inline]
 pub fn wrap_turn(angle_rad: f64) -> f64 {
+    // Mostly within a turn of it already: the same without the division.
+    if (0.0..TAU).contains(&angle_rad) {
+        return angle_rad;
+    }
     let wrapped = angle_rad.rem_euclid(TAU);
     // rem_euclid of a tiny negative number rounds up to the modulus itself.
     if wrapped >= TAU { 0.0 } else { wrapped }

@@ -97,6 +97,20 @@ impl<'a> DbscanParams<'a> {
         self.needed = self.needed.saturating_add(1);
         self
     }
+
+    /// Neighbours that make a core, the point itself among them.
+    pub(super) fn needed(&self) -> usize {
+        self.needed
+    }
+
+    /// Radius of the point with this index, metres.
+    pub(super) fn radius_m(&self, index: usize) -> f64 {
+        self.radius.at(index)
+    }
+
+    pub(super) fn check_length(&self, expected: usize) -> Result<(), ClusterError> {
+        self.radius.check_length(expected)
+    }
 }
 
 /// Labels the points of a cloud by density.
@@ -130,7 +144,7 @@ pub fn dbscan<T: Coordinate>(
     params: &DbscanParams<'_>,
 ) -> Result<Labels, ClusterError> {
     check_points(points)?;
-    params.radius.check_length(points.len())?;
+    params.check_length(points.len())?;
     let on_grid = match &params.radius {
         Radius::Same(radius_m) => dbscan_uniform(points, *radius_m, params.needed),
         Radius::Each(radii_m) => dbscan_graded(points, radii_m, params.needed),
@@ -151,7 +165,7 @@ pub fn dbscan_brute<T: Coordinate>(
     params: &DbscanParams<'_>,
 ) -> Result<Labels, ClusterError> {
     check_points(points)?;
-    params.radius.check_length(points.len())?;
+    params.check_length(points.len())?;
     let n = points.len();
     let sees = |p: usize, q: usize| {
         let radius_m = params.radius.at(p);

@@ -1,5 +1,6 @@
 //! Which points belong together: clusters by density, and contour pieces on one line.
 
+mod bounds;
 mod bricks;
 mod components;
 mod cores;
@@ -8,6 +9,8 @@ mod graded;
 mod grid;
 mod lattice;
 pub mod line;
+mod lines;
+mod noise;
 pub mod radius;
 mod radix;
 mod uniform;
@@ -15,6 +18,7 @@ mod varied;
 
 pub use dbscan::{DbscanParams, Radius, dbscan, dbscan_brute};
 pub use line::{Fate, LineClusters, LineParams, line_clusters};
+pub use noise::is_noise;
 pub use radius::{Intervals, RadiusModel};
 
 /// Label of points that belong to no cluster.

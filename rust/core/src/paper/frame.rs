@@ -7,10 +7,10 @@ use super::frames::{Frame, Share};
 use super::sections::MidLine;
 use super::tip::{NoTip, Plane, Tip, TipLimits, intersect};
 use crate::blade::contour::{LineExtremes, line_extremes};
-use crate::cluster::NOISE;
 use crate::cluster::dbscan::{DbscanParams, dbscan};
 use crate::cluster::line::{LineParams, line_clusters};
 use crate::cluster::radius::{Intervals, RadiusModel};
+use crate::cluster::{NOISE, is_noise};
 use crate::error::InvalidValue;
 use crate::fit::Fit;
 use crate::fit::polynomial::Polynomial;
@@ -216,16 +216,19 @@ fn is_overhead(share: &Share, sensor_m: &Point3<f64>, limit_m: Option<f64>) -> b
 
 fn without_noise(share: &Share, lidar: usize, params: &FrameParams) -> BladePoints {
     // Points of a box are finite and their radii positive, so nothing can refuse them.
-    let labels = clustering(share, lidar, params).and_then(|c| dbscan(&share.points_m, &c).ok());
-    let Some(labels) = labels else {
+    let tell = |made| is_noise(&share.points_m, &share.rings, &made).ok();
+    let Some(noise) = clustering(share, lidar, params).and_then(tell) else {
         return BladePoints::default();
     };
-    let counts = |index: &usize| labels.as_slice()[*index] != NOISE;
-    let kept: Vec<usize> = (0..share.points_m.len()).filter(counts).collect();
     BladePoints {
-        points_m: kept.iter().map(|index| share.points_m[*index]).collect(),
-        rings: kept.iter().map(|index| share.rings[*index]).collect(),
+        points_m: without(&share.points_m, &noise),
+        rings: without(&share.rings, &noise),
     }
+}
+
+fn without<T: Copy>(values: &[T], noise: &[bool]) -> Vec<T> {
+    let kept = values.iter().zip(noise).filter(|(_, noise)| !**noise);
+    kept.map(|(value, _)| *value).collect()
 }
 
 /// Parameters of step 6 for one share; `None` where it has no points or its lidar no distances.

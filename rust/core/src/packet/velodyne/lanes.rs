@@ -1,28 +1,33 @@
-//! The 32 shots of one row, worked out side by side: fixed arrays and no branches,
+//! The shots of a packet, worked out side by side: fixed arrays and no branches,
 //! so that the compiler makes vectors of them. The numbers are those of [`Shots`] to the bit.
 //!
 //! [`Shots`]: super::rows::Shots
 
-use super::CHANNELS;
 use super::rows::Channel;
-use crate::cloud::ReturnKind;
+use super::{BLOCKS, CHANNELS, Packet};
 use crate::packet::aim::{small_turn, wrapped};
-use crate::packet::echoes::{RawEcho, judge};
-use crate::packet::{Decoded, ReturnMode};
 use crate::simd::{Kernel, vectorized};
 
-type Lane<T> = [T; CHANNELS];
+/// One number per shot of a block.
+pub type Lane<T> = [T; CHANNELS];
+/// Blocks of a packet, and a power of two, so that no place needs a check.
+pub const ROOM: usize = BLOCKS.next_power_of_two();
+/// One number per shot of a packet.
+pub type Column<T> = [Lane<T>; ROOM];
 
 /// What decoding needs of the shots of a row, quantity by quantity.
 pub struct Lanes {
     delay_ns: Lane<i64>,
-    ring: Lane<u16>,
+    /// Number of each shot's beam.
+    pub ring: Lane<u16>,
     azimuth_offset_rad: Lane<f64>,
     cos_elevation: Lane<f64>,
     sin_elevation: Lane<f64>,
     vertical_offset_m: Lane<f64>,
     range_offset_m: Lane<f64>,
     range_unit_m: f64,
+    /// All shots point where the encoder does.
+    is_straight: bool,
     turn: Turned,
 }
 
@@ -35,26 +40,40 @@ struct Turned {
 }
 
 /// What is the same for all shots of a row.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub struct Row {
     /// Encoder azimuth at its start.
     pub azimuth_rad: f64,
     /// Instant of its start, nanoseconds since 1970 UTC.
     pub time_ns: i64,
-    /// Number of the packet.
-    pub packet: u32,
     /// Block of the packet, the first of two returns.
-    pub block: u16,
+    pub block: usize,
 }
 
-/// The shots of a row, placed as if all of them had hit.
-struct Placed {
-    encoder_rad: Lane<f32>,
-    azimuth_rad: Lane<f32>,
-    range_m: Lane<f32>,
-    xyz_m: Lane<[f32; 3]>,
-    time_ns: Lane<i64>,
-    intensity: Lane<u16>,
+/// The shots of some rows of a packet, placed as if all of them had hit: block by block, without gaps. Meant to be
+/// used again and again.
+#[derive(Default)]
+pub struct Placed {
+    /// Blocks that are there.
+    pub blocks: usize,
+    /// Which shots of each hit: a bit for each.
+    pub hits: [u32; ROOM],
+    /// Ranges in the model's unit; 0 = no return.
+    pub raw_range: Column<u16>,
+    /// Brightness.
+    pub intensity: Column<u16>,
+    /// Numbers of the blocks.
+    pub block: Column<u16>,
+    /// Encoder azimuths, [0, 2 pi).
+    pub encoder_rad: Column<f32>,
+    /// Azimuths, [0, 2 pi).
+    pub azimuth_rad: Column<f32>,
+    /// Ranges, metres.
+    pub range_m: Column<f32>,
+    /// Positions, metres.
+    pub xyz_m: Column<[f32; 3]>,
+    /// Instants, nanoseconds since 1970 UTC.
+    pub time_ns: Column<i64>,
 }
 
 impl Lanes {
@@ -70,6 +89,7 @@ impl Lanes {
             vertical_offset_m: lane(|c| c.vertical_offset_m),
             range_offset_m: lane(|c| c.range_offset_m),
             range_unit_m,
+            is_straight: channels.iter().all(|c| c.azimuth_offset_rad == 0.0),
             turn: Turned {
                 rate_rad_per_ns: 0.0,
                 turned_rad: [0.0; CHANNELS],
@@ -98,185 +118,103 @@ impl Lanes {
         }
     }
 
-    /// Appends the returns of a row of single returns; echoes without range are none.
-    pub fn push(
-        &self,
-        row: Row,
-        echoes: &Lane<RawEcho>,
-        return_kind: ReturnKind,
-        out: &mut Decoded,
-    ) {
-        match echoes.iter().filter(|echo| echo.range != 0).count() {
-            0 => {}
-            CHANNELS => self.keep_all(row, &self.place(row, echoes), return_kind, out),
-            _ => {
-                let mut hits = [Hit::default(); CHANNELS];
-                let mut count = 0;
-                for (shot, echo) in (0..).zip(echoes) {
-                    hits[count] = Hit {
-                        shot,
-                        place: 0,
-                        return_kind,
-                    };
-                    count += usize::from(echo.range != 0);
-                }
-                self.keep(&hits[..count], row, &[self.place(row, echoes)], out);
-            }
-        }
-    }
-
-    /// Appends the returns of a row of two returns, shot by shot.
-    ///
-    /// Which of the two is the brighter cannot be read from the intensity, which is corrected for
-    /// range; so the nearer is called strongest even where the manual makes it the second strongest.
-    pub fn push_pairs(&self, row: Row, echoes: [&Lane<RawEcho>; 2], out: &mut Decoded) {
-        let mut hits = [Hit::default(); 2 * CHANNELS];
-        let mut count = 0;
-        for shot in 0..CHANNELS {
-            let (kinds, merged) = judge(ReturnMode::Dual, &echoes.map(|lane| lane[shot]));
-            out.merged += u64::from(merged);
-            for (place, kind) in (0..2).zip(kinds) {
-                let Some(return_kind) = kind else { continue };
-                hits[count] = Hit {
-                    shot: shot as u8,
-                    place,
-                    return_kind,
-                };
-                count += 1;
-            }
-        }
-        if count > 0 {
-            let placed = echoes.map(|echoes| self.place(row, echoes));
-            self.keep(&hits[..count], row, &placed, out);
-        }
-    }
-
-    fn place(&self, row: Row, echoes: &Lane<RawEcho>) -> Placed {
+    /// Places the shots of some rows of a packet.
+    pub fn place(&self, packet: &Packet<'_>, rows: &[Row], returns: usize, placed: &mut Placed) {
         vectorized(Place {
             lanes: self,
-            row,
-            echoes,
-        })
-    }
-
-    /// Appends a row in which all shots hit.
-    fn keep_all(&self, row: Row, placed: &Placed, return_kind: ReturnKind, out: &mut Decoded) {
-        let cloud = &mut out.cloud;
-        out.encoder_rad.extend_from_slice(&placed.encoder_rad);
-        cloud.xyz_m.extend_from_slice(&placed.xyz_m);
-        cloud.time_ns.extend_from_slice(&placed.time_ns);
-        cloud.azimuth_rad.extend_from_slice(&placed.azimuth_rad);
-        cloud.ring.extend_from_slice(&self.ring);
-        if out.is_slim {
-            return;
-        }
-        cloud.range_m.extend_from_slice(&placed.range_m);
-        cloud.intensity.extend_from_slice(&placed.intensity);
-        let len = cloud.xyz_m.len();
-        cloud.return_index.resize(len, 0);
-        cloud.return_kind.resize(len, return_kind);
-        cloud.packet.resize(len, row.packet);
-        cloud.block.resize(len, row.block);
-    }
-
-    /// Appends the hits of a row; `placed` has the shots of each of its blocks.
-    fn keep(&self, hits: &[Hit], row: Row, placed: &[Placed], out: &mut Decoded) {
-        let cloud = &mut out.cloud;
-        let shots = || {
-            hits.iter()
-                .map(|hit| (&placed[usize::from(hit.place)], hit.shot()))
-        };
-        out.encoder_rad
-            .extend(shots().map(|(p, k)| p.encoder_rad[k]));
-        cloud.xyz_m.extend(shots().map(|(p, k)| p.xyz_m[k]));
-        cloud.time_ns.extend(shots().map(|(p, k)| p.time_ns[k]));
-        cloud
-            .azimuth_rad
-            .extend(shots().map(|(p, k)| p.azimuth_rad[k]));
-        cloud.ring.extend(shots().map(|(_, k)| self.ring[k]));
-        if out.is_slim {
-            return;
-        }
-        cloud.range_m.extend(shots().map(|(p, k)| p.range_m[k]));
-        cloud.intensity.extend(shots().map(|(p, k)| p.intensity[k]));
-        cloud.return_index.extend(hits.iter().map(|hit| hit.place));
-        cloud
-            .return_kind
-            .extend(hits.iter().map(|hit| hit.return_kind));
-        let block = |hit: &Hit| row.block + u16::from(hit.place);
-        cloud.block.extend(hits.iter().map(block));
-        cloud
-            .packet
-            .resize(cloud.packet.len() + hits.len(), row.packet);
+            packet,
+            rows,
+            returns,
+            placed,
+        });
     }
 }
 
-/// A shot that hit.
-#[derive(Debug, Clone, Copy)]
-struct Hit {
-    shot: u8,
-    place: u8, // among the returns of the shot
-    return_kind: ReturnKind,
-}
-
-impl Hit {
-    #[inline(always)]
-    fn shot(&self) -> usize {
-        usize::from(self.shot) % CHANNELS
-    }
-}
-
-impl Default for Hit {
-    fn default() -> Self {
-        Self {
-            shot: 0,
-            place: 0,
-            return_kind: ReturnKind::Strongest,
-        }
-    }
-}
-
-/// Places all shots of a row.
+/// Places all shots of some rows.
 struct Place<'a> {
     lanes: &'a Lanes,
-    row: Row,
-    echoes: &'a Lane<RawEcho>,
+    packet: &'a Packet<'a>,
+    rows: &'a [Row],
+    returns: usize,
+    placed: &'a mut Placed,
 }
 
 impl Kernel for Place<'_> {
-    type Out = Placed;
+    type Out = ();
 
     #[inline(always)]
-    fn run(self) -> Placed {
-        let Self { lanes, row, echoes } = self;
-        let (row_sin, row_cos) = row.azimuth_rad.sin_cos();
-        let mut placed = Placed {
-            encoder_rad: [0.0; CHANNELS],
-            azimuth_rad: [0.0; CHANNELS],
-            range_m: [0.0; CHANNELS],
-            xyz_m: [[0.0; 3]; CHANNELS],
-            time_ns: lanes.delay_ns.map(|delay| row.time_ns.wrapping_add(delay)),
-            intensity: echoes.map(|echo| echo.intensity.into()),
-        };
-        for k in 0..CHANNELS {
-            let encoder_rad = row.azimuth_rad + lanes.turn.turned_rad[k];
-            placed.encoder_rad[k] = wrapped(encoder_rad);
-            placed.azimuth_rad[k] = wrapped(encoder_rad + lanes.azimuth_offset_rad[k]);
+    fn run(self) {
+        let placed = self.placed;
+        placed.blocks = 0;
+        for row in self.rows {
+            let sin_cos = row.azimuth_rad.sin_cos();
+            for block in row.block..row.block + self.returns {
+                let place = placed.blocks % ROOM;
+                placed.block[place] = [block as u16; CHANNELS];
+                placed.read(place, self.packet.returns_of(block));
+                placed.aim(place, self.lanes, row);
+                placed.reach(place, self.lanes, sin_cos);
+                placed.blocks += 1;
+            }
         }
-        for (k, echo) in echoes.iter().enumerate() {
+    }
+}
+
+impl Placed {
+    /// Takes the echoes of a block.
+    #[inline(always)]
+    fn read(&mut self, place: usize, bytes: &[u8; 3 * CHANNELS]) {
+        let (range, intensity) = (&mut self.raw_range[place], &mut self.intensity[place]);
+        let mut hits = 0;
+        for k in 0..CHANNELS {
+            range[k] = u16::from(bytes[3 * k]) | u16::from(bytes[3 * k + 1]) << 8;
+            intensity[k] = u16::from(bytes[3 * k + 2]);
+            hits |= u32::from(range[k] != 0) << k;
+        }
+        self.hits[place] = hits;
+    }
+
+    /// When a block's shots are fired, and where to.
+    #[inline(always)]
+    fn aim(&mut self, place: usize, lanes: &Lanes, row: &Row) {
+        let time_ns = &mut self.time_ns[place];
+        for (time_ns, delay_ns) in time_ns.iter_mut().zip(&lanes.delay_ns) {
+            *time_ns = row.time_ns.wrapping_add(*delay_ns);
+        }
+        let encoder_rad = &mut self.encoder_rad[place];
+        for (encoder_rad, turned_rad) in encoder_rad.iter_mut().zip(&lanes.turn.turned_rad) {
+            *encoder_rad = wrapped(row.azimuth_rad + turned_rad);
+        }
+        if lanes.is_straight {
+            self.azimuth_rad[place] = self.encoder_rad[place];
+            return;
+        }
+        let shots = lanes.turn.turned_rad.iter().zip(&lanes.azimuth_offset_rad);
+        for (azimuth_rad, (turned_rad, offset_rad)) in self.azimuth_rad[place].iter_mut().zip(shots)
+        {
+            *azimuth_rad = wrapped(row.azimuth_rad + turned_rad + offset_rad);
+        }
+    }
+
+    /// How far they reach.
+    #[inline(always)]
+    fn reach(&mut self, place: usize, lanes: &Lanes, (row_sin, row_cos): (f64, f64)) {
+        let raw_range = self.raw_range[place];
+        let (mut ranges_m, mut xyz_m) = ([0.0; CHANNELS], [[0.0; 3]; CHANNELS]);
+        for k in 0..CHANNELS {
             let (sin_by, cos_by) = (lanes.turn.sin[k], lanes.turn.cos[k]);
             let sin = row_sin * cos_by + row_cos * sin_by;
             let cos = row_cos * cos_by - row_sin * sin_by;
-            let range_m = f64::from(echo.range) * lanes.range_unit_m + lanes.range_offset_m[k];
+            let range_m = f64::from(raw_range[k]) * lanes.range_unit_m + lanes.range_offset_m[k];
             let level_m = range_m * lanes.cos_elevation[k];
             let height_m = range_m * lanes.sin_elevation[k] + lanes.vertical_offset_m[k];
-            placed.range_m[k] = range_m as f32;
-            placed.xyz_m[k] = [
+            ranges_m[k] = range_m as f32;
+            xyz_m[k] = [
                 (level_m * cos) as f32,
                 (-level_m * sin) as f32,
                 height_m as f32,
             ];
         }
-        placed
+        (self.range_m[place], self.xyz_m[place]) = (ranges_m, xyz_m);
     }
 }

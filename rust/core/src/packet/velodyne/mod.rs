@@ -5,6 +5,7 @@
 mod calibration;
 pub mod hdl32e;
 pub mod hdl64e;
+mod hits;
 mod lanes;
 pub mod position;
 pub mod puck;
@@ -12,6 +13,7 @@ mod reach;
 pub(super) mod rotation;
 mod rows;
 mod table;
+mod tally;
 pub mod vlp32;
 pub mod vls128;
 pub mod writer;
@@ -43,6 +45,12 @@ mod field {
 }
 
 /// First byte of the flags of all blocks; the second tells the bank of lasers.
+/// Which bytes of three words of eight returns belong to ranges.
+const RANGE_BYTES: [u64; 3] = [
+    0xFFFF_00FF_FF00_FFFF,
+    0xFF00_FFFF_00FF_FF00,
+    0x00FF_FF00_FFFF_00FF,
+];
 const FLAG_FIRST: u8 = 0xFF;
 /// Second bytes of the flags of lasers 0 to 31, 32 to 63, 64 to 95 and 96 to 127.
 const FLAG_BANKS: [u8; 4] = [0xEE, 0xDD, 0xCC, 0xBB];
@@ -72,14 +80,16 @@ impl<'a> Packet<'a> {
         payload.try_into().ok().map(Self)
     }
 
+    #[inline(always)]
     fn block(&self, block: usize) -> &'a [u8] {
         let start = block % BLOCKS * field::BLOCK_LEN;
         &self.0[start..start + field::BLOCK_LEN]
     }
 
     /// Whether a block carries lasers 0 to 31.
+    #[inline(always)]
     pub fn is_lower(&self, block: usize) -> bool {
-        self.bank(block) == Some(0)
+        self.block(block)[field::FLAG] == [FLAG_FIRST, FLAG_BANKS[0]]
     }
 
     /// The bank of 32 lasers that a block carries; `None` where its flag is none.
@@ -96,6 +106,7 @@ impl<'a> Packet<'a> {
     }
 
     /// Azimuth of a block, 0.01 degree; 36000 and above are not valid.
+    #[inline(always)]
     pub fn azimuth_centideg(&self, block: usize) -> u16 {
         let bytes = &self.block(block)[field::AZIMUTH];
         u16::from_le_bytes([bytes[0], bytes[1]])
@@ -112,11 +123,38 @@ impl<'a> Packet<'a> {
 
     /// The same, all at once.
     pub fn echoes(&self, block: usize) -> [RawReturn; CHANNELS] {
-        let bytes = &self.block(block)[field::RETURNS];
+        let bytes = self.returns_of(block);
         std::array::from_fn(|k| RawReturn {
             range: u16::from_le_bytes([bytes[3 * k], bytes[3 * k + 1]]),
             intensity: bytes[3 * k + 2],
         })
+    }
+
+    /// Bytes of the returns of a block.
+    #[inline(always)]
+    fn returns_of(&self, block: usize) -> &'a [u8; CHANNELS * field::RETURN_LEN] {
+        let start = block % BLOCKS * field::BLOCK_LEN + field::RETURNS.start;
+        self.0[start..]
+            .first_chunk()
+            .expect("a block of the packet")
+    }
+
+    /// Whether any shot of a block has a range.
+    #[inline(always)]
+    fn has_echoes(&self, block: usize) -> bool {
+        let (words, _) = self.returns_of(block).as_chunks::<8>();
+        let ranges = (words.iter().zip(RANGE_BYTES.iter().cycle())).fold(0, |any, (word, mask)| {
+            any | u64::from_le_bytes(*word) & mask
+        });
+        ranges != 0
+    }
+
+    /// Bytes of the returns of a block, and to each the one that follows it in the packet.
+    #[inline(always)]
+    fn returns_and_next(&self, block: usize) -> (&'a [u8], &'a [u8]) {
+        let start = block % BLOCKS * field::BLOCK_LEN;
+        let place = |from: usize| from + field::RETURNS.start..from + field::RETURNS.end;
+        (&self.0[place(start)], &self.0[place(start + 1)])
     }
 
     /// Device time of the first shot, microseconds past the hour.

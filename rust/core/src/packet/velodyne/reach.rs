@@ -1,11 +1,10 @@
 //! Where the returns of a packet may lie: what is wanted in few directions need not be decoded in all.
 
-use super::rotation::BACKLASH_CENTIDEG;
+use super::rotation::{MAX_ROWS, TURN, steps, within_turn};
 use super::rows::Channel;
-use super::{BLOCKS, CHANNELS, Packet, TURN_CENTIDEG};
+use super::{BLOCKS, CHANNELS, Packet};
 use crate::angle::Arc;
 
-const TURN: i32 = TURN_CENTIDEG as i32;
 /// Nearer than this to the spin axis a return may lie in any direction, metres.
 const NEAR_M: f64 = 0.5;
 
@@ -35,33 +34,33 @@ impl Reach {
     /// Whether a return of the packet may lie in an arc of bearings, which run against azimuths.
     pub fn meets(&self, packet: &Packet<'_>, bearings: Arc) -> bool {
         let Some(aside) = self.aside else { return true };
-        let mut azimuths = [0; BLOCKS];
+        let mut azimuths = [0; MAX_ROWS];
         let rows = (0..BLOCKS).step_by(packet.return_mode().returns());
         let count = rows.len();
         for (azimuth, block) in azimuths.iter_mut().zip(rows) {
-            *azimuth = i32::from(packet.azimuth_centideg(block));
+            *azimuth = packet.azimuth_centideg(block);
         }
-        let azimuths = &azimuths[..count];
-        let margin = aside.saturating_add(self.rows.saturating_mul(widest_step(azimuths)));
+        let margin = self.rows.saturating_mul(widest_step(&azimuths, count));
+        let margin = aside.saturating_add(margin);
         let from = (-100.0 * (bearings.from_rad + bearings.width_rad).to_degrees()).floor() as i32;
+        let from = from.rem_euclid(TURN);
         let width = (100.0 * bearings.width_rad.to_degrees()).ceil() as i32 + 1;
-        let is_within = |azimuth: &i32| {
-            let after = (azimuth - from).rem_euclid(TURN);
+        let is_within = |azimuth: i32| {
+            let after = within_turn(azimuth - from);
             // Azimuths beyond a turn are not valid: the decoder is to say so.
-            *azimuth >= TURN || after <= width + margin || TURN - after <= margin
+            (azimuth >= TURN) | (after <= width + margin) | (TURN - after <= margin)
         };
-        azimuths.iter().any(is_within)
+        let azimuths = azimuths[..count].iter().copied().map(i32::from);
+        azimuths.fold(false, |any, azimuth| any | is_within(azimuth))
     }
 }
 
 /// The rate of a packet is a mean of its steps, so that no shot lies farther from its row than the
 /// widest of them; 0.01 degree.
-fn widest_step(azimuths: &[i32]) -> i32 {
-    let size = |pair: &[i32]| match (pair[1] - pair[0]).rem_euclid(TURN) {
-        back if back > TURN - BACKLASH_CENTIDEG => TURN - back,
-        forth => forth,
-    };
-    azimuths.windows(2).map(size).max().unwrap_or(TURN)
+fn widest_step(azimuths: &[u16; MAX_ROWS], rows: usize) -> i32 {
+    let steps = steps(azimuths);
+    let sizes = steps[..rows - 1].iter().map(|step| step.abs());
+    sizes.max().unwrap_or(TURN)
 }
 
 #[cfg(test)]

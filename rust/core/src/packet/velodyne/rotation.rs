@@ -3,12 +3,14 @@
 use super::TURN_CENTIDEG;
 use crate::packet::LeftOut;
 
+/// One turn, 0.01 degree.
+pub const TURN: i32 = TURN_CENTIDEG as i32;
 /// Angle of one hundredth of a degree.
 const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
 /// More rows than any packet of the family has.
-const MAX_ROWS: usize = 12;
+pub const MAX_ROWS: usize = 12;
 /// Steps back by less than this are jitter of the encoder, not a gap of nearly a turn; 0.01 degree.
-pub const BACKLASH_CENTIDEG: i32 = 100;
+const BACKLASH_CENTIDEG: i32 = 100;
 /// Steps may always differ by this from the usual one; 0.01 degree.
 const JITTER_CENTIDEG: i32 = 20;
 
@@ -16,9 +18,10 @@ const JITTER_CENTIDEG: i32 = 20;
 #[derive(Debug, Clone, Copy)]
 pub struct Rotation {
     rows: usize,
-    azimuth_rad: [f64; MAX_ROWS],
-    start_ns: [i64; MAX_ROWS],
-    valid: [bool; MAX_ROWS],
+    raw: [u16; MAX_ROWS],
+    row_ns: i64,
+    /// By how much rows are late for what was left out before them.
+    late_ns: [i64; MAX_ROWS],
     rate_rad_per_ns: f64,
     turned_rad: f64,
     duration_ns: i64,
@@ -38,54 +41,58 @@ impl Rotation {
         mean_rate_rad_per_ns: f64,
     ) -> Self {
         let mut raw = [0; MAX_ROWS];
-        let mut rows = 0;
+        let mut rows = 0_usize;
         for (place, azimuth) in raw.iter_mut().zip(azimuths_centideg) {
             *place = azimuth;
             rows += 1;
         }
-        let steps = steps(&raw[..rows]);
+        let steps = steps(&raw);
         let between = &steps[..rows.saturating_sub(1)];
-        // Where all steps are so near to each other none can be far off the usual one.
-        let is_even = spread(between) <= JITTER_CENTIDEG;
-        let usual = if is_even { 0 } else { median(between) };
-        let is_usual =
-            |step: i32| is_even || (step - usual).abs() <= usual.abs() / 2 + JITTER_CENTIDEG;
-        let normal = between.iter().filter(|step| is_usual(**step));
-        let (sum, count) = normal.fold((0, 0), |(sum, count), step| (sum + step, count + 1));
-        let row_step = f64::from(sum) / f64::from(count.max(1)); // 0.01 degree a row
-        let rate = row_step * RAD_PER_CENTIDEG / row_ns as f64;
-
+        let usual = Usual::of(between);
+        let row_step = usual.mean(between); // 0.01 degree a row
         let mut rotation = Self {
             rows,
-            azimuth_rad: [0.0; MAX_ROWS],
-            start_ns: [0; MAX_ROWS],
-            valid: [false; MAX_ROWS],
-            rate_rad_per_ns: rate,
+            raw,
+            row_ns,
+            late_ns: [0; MAX_ROWS],
+            rate_rad_per_ns: row_step * RAD_PER_CENTIDEG / row_ns as f64,
             turned_rad: 0.0,
             duration_ns: 0,
             left_out: None,
         };
-        let over_gap = if mean_rate_rad_per_ns > 0.0 {
-            mean_rate_rad_per_ns
-        } else {
-            rate
+        let (gap_ns, gap_rad) = match usual {
+            Usual::Any => (0, 0.0),
+            _ => rotation.leave_gaps(&usual, between, row_step, mean_rate_rad_per_ns),
         };
-        let (mut gap_ns, mut gap_rad) = (0, 0.0);
-        for row in 0..rows {
-            rotation.azimuth_rad[row] = f64::from(raw[row]) * RAD_PER_CENTIDEG;
-            rotation.valid[row] = raw[row] < TURN_CENTIDEG;
-            rotation.start_ns[row] = row as i64 * row_ns + gap_ns;
-            let step = steps[row];
-            if row + 1 < rows && !is_usual(step) && over_gap > 0.0 {
-                let excess_rad = (f64::from(step) - row_step) * RAD_PER_CENTIDEG;
-                rotation.leave_out((row + 1) as f64 * row_step * RAD_PER_CENTIDEG, excess_rad);
-                gap_ns += (excess_rad / over_gap) as i64;
-                gap_rad += excess_rad;
-            }
-        }
         rotation.duration_ns = rows as i64 * row_ns + gap_ns;
         rotation.turned_rad = rows as f64 * row_step * RAD_PER_CENTIDEG + gap_rad;
         rotation
+    }
+
+    /// Makes the rows behind what was left out late; gives time and angle of it all.
+    fn leave_gaps(
+        &mut self,
+        usual: &Usual,
+        between: &[i32],
+        row_step: f64,
+        mean_rate_rad_per_ns: f64,
+    ) -> (i64, f64) {
+        let over_gap = if mean_rate_rad_per_ns > 0.0 {
+            mean_rate_rad_per_ns
+        } else {
+            self.rate_rad_per_ns
+        };
+        let (mut gap_ns, mut gap_rad) = (0, 0.0);
+        for (row, step) in (1..).zip(between) {
+            if !usual.holds(*step) && over_gap > 0.0 {
+                let excess_rad = (f64::from(*step) - row_step) * RAD_PER_CENTIDEG;
+                self.leave_out(row as f64 * row_step * RAD_PER_CENTIDEG, excess_rad);
+                gap_ns += (excess_rad / over_gap) as i64;
+                gap_rad += excess_rad;
+            }
+            self.late_ns[row] = gap_ns;
+        }
+        (gap_ns, gap_rad)
     }
 
     /// Keeps the widest gap: a sensor has one field of view.
@@ -106,17 +113,17 @@ impl Rotation {
 
     /// Encoder azimuth of a row's first shot, [0, 2 pi).
     pub fn azimuth_rad(&self, row: usize) -> f64 {
-        self.azimuth_rad[row]
+        f64::from(self.raw[row]) * RAD_PER_CENTIDEG
     }
 
     /// Time of a row's first shot after the packet's stamp.
     pub fn start_ns(&self, row: usize) -> i64 {
-        self.start_ns[row]
+        row as i64 * self.row_ns + self.late_ns[row]
     }
 
     /// Whether the row states an azimuth within one turn.
     pub fn is_valid(&self, row: usize) -> bool {
-        row < self.rows && self.valid[row]
+        row < self.rows && self.raw[row] < TURN_CENTIDEG
     }
 
     /// Rotation rate within the packet.
@@ -135,19 +142,56 @@ impl Rotation {
     }
 }
 
-/// Forward steps from row to row, 0.01 degree, in [-`BACKLASH_CENTIDEG`, one turn).
-fn steps(raw: &[u16]) -> [i32; MAX_ROWS] {
-    let turn = i32::from(TURN_CENTIDEG);
-    let mut steps = [0; MAX_ROWS];
-    for (place, pair) in steps.iter_mut().zip(raw.windows(2)) {
-        let step = (i32::from(pair[1]) - i32::from(pair[0])).rem_euclid(turn);
-        *place = if step > turn - BACKLASH_CENTIDEG {
-            step - turn
+/// Which steps from row to row are those of the rotation, 0.01 degree.
+#[derive(Debug, Clone, Copy)]
+enum Usual {
+    /// All: they are so near to each other that none can be far off the others.
+    Any,
+    /// Those near the median.
+    Near(i32),
+}
+
+impl Usual {
+    fn of(steps: &[i32]) -> Self {
+        if spread(steps) <= JITTER_CENTIDEG {
+            Self::Any
         } else {
-            step
-        };
+            Self::Near(median(steps))
+        }
+    }
+
+    fn holds(&self, step: i32) -> bool {
+        match self {
+            Self::Any => true,
+            Self::Near(usual) => (step - usual).abs() <= usual.abs() / 2 + JITTER_CENTIDEG,
+        }
+    }
+
+    /// Mean of the steps that are usual.
+    fn mean(&self, steps: &[i32]) -> f64 {
+        let usual = steps.iter().filter(|step| self.holds(**step));
+        let (sum, count) = usual.fold((0, 0), |(sum, count), step| (sum + step, count + 1));
+        f64::from(sum) / f64::from(count.max(1))
+    }
+}
+
+/// Forward steps from row to row, 0.01 degree, in [-`BACKLASH_CENTIDEG`, one turn).
+pub fn steps(raw: &[u16; MAX_ROWS]) -> [i32; MAX_ROWS] {
+    let mut steps = [0; MAX_ROWS];
+    for (step, row) in steps.iter_mut().zip(1..MAX_ROWS) {
+        let forth = within_turn(i32::from(raw[row]) - i32::from(raw[row - 1]));
+        let is_back = forth > TURN - BACKLASH_CENTIDEG;
+        *step = forth - if is_back { TURN } else { 0 };
     }
     steps
+}
+
+/// A difference of numbers of two bytes, 0.01 degree, brought into one turn: without branches.
+#[inline(always)]
+pub fn within_turn(difference: i32) -> i32 {
+    let up = |angle: i32| angle + if angle < 0 { TURN } else { 0 };
+    let positive = up(up(difference));
+    positive - if positive >= TURN { TURN } else { 0 }
 }
 
 /// Widest step less the smallest.
@@ -197,6 +241,13 @@ mod tests {
         let gap = rotation.left_out().unwrap();
         assert!((degrees(gap.after_rad) - 2.0).abs() < 1e-9);
         assert!((degrees(gap.width_rad) - 180.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn all_differences_of_two_bytes_are_brought_into_one_turn() {
+        for difference in -65_535..=65_535 {
+            assert_eq!(within_turn(difference), difference.rem_euclid(TURN));
+        }
     }
 
     #[test]

@@ -3,7 +3,8 @@
 //! In dual return two blocks hold the same shots: the first the last returns, the second the
 //! strongest (or the second strongest where the last is the strongest).
 
-use super::lanes::{Lanes, Row};
+use super::hits::{Hits, Origin};
+use super::lanes::{Lanes, Placed, Row};
 use super::reach::Reach;
 use super::rotation::Rotation;
 use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
@@ -13,7 +14,7 @@ use crate::error::InvalidValue;
 use crate::packet::aim::{turn, wrapped};
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::echoes::judge;
-use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode, Tally};
+use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode};
 use crate::time::Timestamp;
 
 /// How a model fires.
@@ -69,6 +70,8 @@ impl Firing {
             firing: *self,
             reach: Reach::new(&channels, self.row_ns()),
             lanes: Lanes::new(&channels, self.range_unit_m),
+            placed: Placed::default(),
+            hits: Hits::default(),
         }))
     }
 
@@ -77,27 +80,6 @@ impl Firing {
         let azimuths = rows.map(|block| packet.azimuth_centideg(block));
         Rotation::new(azimuths, self.row_ns(), mean_rate_rad_per_ns)
     }
-}
-
-/// Numbers of points in a data packet.
-pub fn tally(payload: &[u8]) -> Tally {
-    let Some(packet) = Packet::new(payload) else {
-        return Tally::default();
-    };
-    let mut tally = Tally::default();
-    let stride = packet.return_mode().returns();
-    let rows = (0..BLOCKS / stride).filter(|row| is_usable(&packet, *row, stride));
-    for block in rows.map(|row| row * stride) {
-        if stride == 1 {
-            let hits = packet.returns(block).filter(|echo| echo.range != 0);
-            tally.points += hits.count() as u32;
-            continue;
-        }
-        for (last, strongest) in packet.returns(block).zip(packet.returns(block + 1)) {
-            tally.add_pair(last.range, strongest.range);
-        }
-    }
-    tally
 }
 
 /// What a payload is to the models of one bank with the product bytes `products`.
@@ -120,7 +102,8 @@ pub fn recognise_product(payload: &[u8], products: &[u8]) -> Option<PacketKind> 
 }
 
 /// Whether the blocks of a row have the flag and an azimuth within one turn.
-fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
+#[inline(always)]
+pub(super) fn is_usable(packet: &Packet<'_>, row: usize, stride: usize) -> bool {
     let mut blocks = row * stride..(row + 1) * stride;
     blocks.all(|block| packet.is_lower(block))
         && packet.azimuth_centideg(row * stride) < TURN_CENTIDEG
@@ -158,6 +141,8 @@ struct RowsDecoder {
     firing: Firing,
     lanes: Lanes,
     reach: Reach,
+    placed: Placed,
+    hits: Hits,
 }
 
 impl Decoder for RowsDecoder {
@@ -168,26 +153,31 @@ impl Decoder for RowsDecoder {
         let rotation = self.firing.rotation(&packet, place.mean_rate_rad_per_ns);
         let mode = packet.return_mode();
         let stride = mode.returns();
-        self.lanes.set_rate(rotation.rate_rad_per_ns());
+        let (mut rows, mut count) = ([Row::default(); BLOCKS], 0);
         for row in 0..BLOCKS / stride {
             if !is_usable(&packet, row, stride) {
                 out.drops.add("block_invalid", stride as u64);
-                continue;
+            } else if (row * stride..(row + 1) * stride).any(|block| packet.has_echoes(block)) {
+                rows[count] = Row {
+                    azimuth_rad: rotation.azimuth_rad(row),
+                    time_ns: (place.time + rotation.start_ns(row)).0,
+                    block: row * stride,
+                };
+                count += 1;
             }
-            let block = row * stride;
-            let row = Row {
-                azimuth_rad: rotation.azimuth_rad(row),
-                time_ns: (place.time + rotation.start_ns(row)).0,
-                packet: place.packet,
-                block: block as u16,
-            };
-            let first = packet.echoes(block);
-            if stride == 1 {
-                self.lanes.push(row, &first, single_kind(mode), out);
-            } else {
-                let echoes = [&first, &packet.echoes(block + 1)];
-                self.lanes.push_pairs(row, echoes, out);
-            }
+        }
+        self.lanes.set_rate(rotation.rate_rad_per_ns());
+        self.lanes
+            .place(&packet, &rows[..count], stride, &mut self.placed);
+        let origin = Origin {
+            packet: place.packet,
+            ring: &self.lanes.ring,
+        };
+        if stride == 1 {
+            self.hits
+                .push_single(&self.placed, single_kind(mode), origin, out);
+        } else {
+            self.hits.push_pairs(&self.placed, origin, out);
         }
     }
 

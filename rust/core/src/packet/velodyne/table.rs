@@ -4,6 +4,7 @@
 use std::fmt::Debug;
 
 use super::rows::{self, Firing};
+use super::tally::tally;
 use super::{Packet, calibration};
 use crate::error::UnitError;
 use crate::packet::beams::Beams;
@@ -79,7 +80,7 @@ impl<T: Table> Model for T {
     }
 
     fn tally(&self, payload: &[u8]) -> Tally {
-        rows::tally(payload)
+        tally(payload)
     }
 
     fn period_ns(&self, mode: ReturnMode) -> i64 {
