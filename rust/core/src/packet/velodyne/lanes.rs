@@ -12,12 +12,15 @@ use crate::simd::{Kernel, vectorized};
 pub type Lane<T> = [T; CHANNELS];
 /// Blocks of a packet, and a power of two, so that no place needs a check.
 pub const ROOM: usize = BLOCKS.next_power_of_two();
+/// Shots that there is room for.
+pub const SHOTS: usize = ROOM * CHANNELS;
 /// One number per shot of a packet.
 pub type Column<T> = [Lane<T>; ROOM];
 
 /// What decoding needs of the shots of a row, quantity by quantity.
 pub struct Lanes {
-    delay_ns: Lane<i64>,
+    /// When each shot is fired, after the first of its row.
+    pub delay_ns: Lane<u32>,
     /// Number of each shot's beam.
     pub ring: Lane<u16>,
     azimuth_offset_rad: Lane<f64>,
@@ -62,18 +65,18 @@ pub struct Placed {
     pub raw_range: Column<u16>,
     /// Brightness.
     pub intensity: Column<u16>,
-    /// Numbers of the blocks.
-    pub block: Column<u16>,
+    /// Number of each block.
+    pub block: [u16; ROOM],
+    /// When the row of each block begins, nanoseconds since 1970 UTC.
+    pub start_ns: [i64; ROOM],
     /// Encoder azimuths, [0, 2 pi).
     pub encoder_rad: Column<f32>,
     /// Azimuths, [0, 2 pi).
     pub azimuth_rad: Column<f32>,
     /// Ranges, metres.
     pub range_m: Column<f32>,
-    /// Positions, metres.
-    pub xyz_m: Column<[f32; 3]>,
-    /// Instants, nanoseconds since 1970 UTC.
-    pub time_ns: Column<i64>,
+    /// Positions, metres, axis by axis.
+    pub xyz_m: [Column<f32>; 3],
 }
 
 impl Lanes {
@@ -81,7 +84,9 @@ impl Lanes {
     pub fn new(channels: &[Channel; CHANNELS], range_unit_m: f64) -> Self {
         let lane = |quantity: fn(&Channel) -> f64| std::array::from_fn(|k| quantity(&channels[k]));
         let mut lanes = Self {
-            delay_ns: std::array::from_fn(|k| channels[k].delay_ns),
+            delay_ns: std::array::from_fn(|k| {
+                u32::try_from(channels[k].delay_ns).expect("the tables of models are in order")
+            }),
             ring: std::array::from_fn(|k| channels[k].ring),
             azimuth_offset_rad: lane(|c| c.azimuth_offset_rad),
             cos_elevation: lane(|c| c.cos_elevation),
@@ -111,7 +116,7 @@ impl Lanes {
     fn turn_by(&mut self, rate_rad_per_ns: f64) {
         self.turn.rate_rad_per_ns = rate_rad_per_ns;
         for k in 0..CHANNELS {
-            let turned_rad = rate_rad_per_ns * self.delay_ns[k] as f64;
+            let turned_rad = rate_rad_per_ns * f64::from(self.delay_ns[k]);
             self.turn.turned_rad[k] = turned_rad;
             (self.turn.sin[k], self.turn.cos[k]) =
                 small_turn(turned_rad + self.azimuth_offset_rad[k]);
@@ -150,7 +155,8 @@ impl Kernel for Place<'_> {
             let sin_cos = row.azimuth_rad.sin_cos();
             for block in row.block..row.block + self.returns {
                 let place = placed.blocks % ROOM;
-                placed.block[place] = [block as u16; CHANNELS];
+                placed.block[place] = block as u16;
+                placed.start_ns[place] = row.time_ns;
                 placed.read(place, self.packet.returns_of(block));
                 placed.aim(place, self.lanes, row);
                 placed.reach(place, self.lanes, sin_cos);
@@ -161,6 +167,12 @@ impl Kernel for Place<'_> {
 }
 
 impl Placed {
+    /// Instant of a shot, nanoseconds since 1970 UTC.
+    #[inline]
+    pub fn time_ns(&self, lanes: &Lanes, block: usize, shot: usize) -> i64 {
+        self.start_ns[block].wrapping_add(lanes.delay_ns[shot].into())
+    }
+
     /// Takes the echoes of a block.
     #[inline(always)]
     fn read(&mut self, place: usize, bytes: &[u8; 3 * CHANNELS]) {
@@ -174,13 +186,9 @@ impl Placed {
         self.hits[place] = hits;
     }
 
-    /// When a block's shots are fired, and where to.
+    /// Where a block's shots are fired to.
     #[inline(always)]
     fn aim(&mut self, place: usize, lanes: &Lanes, row: &Row) {
-        let time_ns = &mut self.time_ns[place];
-        for (time_ns, delay_ns) in time_ns.iter_mut().zip(&lanes.delay_ns) {
-            *time_ns = row.time_ns.wrapping_add(*delay_ns);
-        }
         let encoder_rad = &mut self.encoder_rad[place];
         for (encoder_rad, turned_rad) in encoder_rad.iter_mut().zip(&lanes.turn.turned_rad) {
             *encoder_rad = wrapped(row.azimuth_rad + turned_rad);
@@ -200,7 +208,8 @@ impl Placed {
     #[inline(always)]
     fn reach(&mut self, place: usize, lanes: &Lanes, (row_sin, row_cos): (f64, f64)) {
         let raw_range = self.raw_range[place];
-        let (mut ranges_m, mut xyz_m) = ([0.0; CHANNELS], [[0.0; 3]; CHANNELS]);
+        let mut ranges_m = [0.0; CHANNELS];
+        let [mut x_m, mut y_m, mut z_m] = [[0.0; CHANNELS]; 3];
         for k in 0..CHANNELS {
             let (sin_by, cos_by) = (lanes.turn.sin[k], lanes.turn.cos[k]);
             let sin = row_sin * cos_by + row_cos * sin_by;
@@ -209,12 +218,13 @@ impl Placed {
             let level_m = range_m * lanes.cos_elevation[k];
             let height_m = range_m * lanes.sin_elevation[k] + lanes.vertical_offset_m[k];
             ranges_m[k] = range_m as f32;
-            xyz_m[k] = [
-                (level_m * cos) as f32,
-                (-level_m * sin) as f32,
-                height_m as f32,
-            ];
+            x_m[k] = (level_m * cos) as f32;
+            y_m[k] = (-level_m * sin) as f32;
+            z_m[k] = height_m as f32;
         }
-        (self.range_m[place], self.xyz_m[place]) = (ranges_m, xyz_m);
+        self.range_m[place] = ranges_m;
+        for (axis, lane) in self.xyz_m.iter_mut().zip([x_m, y_m, z_m]) {
+            axis[place] = lane;
+        }
     }
 }

@@ -5,13 +5,14 @@
 mod calibration;
 pub mod hdl32e;
 pub mod hdl64e;
-mod hits;
 mod lanes;
+mod pairs;
 pub mod position;
 pub mod puck;
 mod reach;
 pub(super) mod rotation;
 mod rows;
+mod squeeze;
 mod table;
 mod tally;
 pub mod vlp32;

@@ -3,10 +3,11 @@
 //! In dual return two blocks hold the same shots: the first the last returns, the second the
 //! strongest (or the second strongest where the last is the strongest).
 
-use super::hits::{Hits, Origin};
 use super::lanes::{Lanes, Placed, Row};
+use super::pairs::Pairs;
 use super::reach::Reach;
 use super::rotation::Rotation;
+use super::squeeze::Squeezed;
 use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
 use crate::angle::Arc;
 use crate::cloud::{Return, ReturnKind};
@@ -71,7 +72,8 @@ impl Firing {
             reach: Reach::new(&channels, self.row_ns()),
             lanes: Lanes::new(&channels, self.range_unit_m),
             placed: Placed::default(),
-            hits: Hits::default(),
+            squeezed: Squeezed::default(),
+            pairs: Pairs::default(),
         }))
     }
 
@@ -142,7 +144,8 @@ struct RowsDecoder {
     lanes: Lanes,
     reach: Reach,
     placed: Placed,
-    hits: Hits,
+    squeezed: Squeezed,
+    pairs: Pairs,
 }
 
 impl Decoder for RowsDecoder {
@@ -169,15 +172,12 @@ impl Decoder for RowsDecoder {
         self.lanes.set_rate(rotation.rate_rad_per_ns());
         self.lanes
             .place(&packet, &rows[..count], stride, &mut self.placed);
-        let origin = Origin {
-            packet: place.packet,
-            ring: &self.lanes.ring,
-        };
+        let (placed, lanes) = (&self.placed, &self.lanes);
         if stride == 1 {
-            self.hits
-                .push_single(&self.placed, single_kind(mode), origin, out);
+            let kind = single_kind(mode);
+            self.squeezed.push(placed, lanes, place.packet, kind, out);
         } else {
-            self.hits.push_pairs(&self.placed, origin, out);
+            self.pairs.push(placed, lanes, place.packet, out);
         }
     }
 
@@ -295,6 +295,103 @@ impl Shots {
         for (place, (echo, kind)) in echoes.into_iter().zip(kinds).enumerate() {
             if let Some(kind) = kind {
                 self.echo(channel, echo, place as u8, kind, block + place, out);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::velodyne::puck::{FIRING_NS, RANGE_UNIT_M, VLP16};
+    use crate::packet::velodyne::{LEN, RawBlock, encode};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const FIRING: Firing = Firing {
+        lasers: 16,
+        firing_ns: FIRING_NS,
+        range_unit_m: RANGE_UNIT_M,
+    };
+
+    /// Beams that differ in all that a beam may have.
+    fn beams() -> Beams {
+        let mut channels = VLP16.beams().channels().to_vec();
+        for (number, beam) in channels.iter_mut().enumerate() {
+            beam.azimuth_offset_rad = 0.01 * number as f64 - 0.05;
+            beam.range_offset_m = 0.001 * number as f64;
+        }
+        Beams::new(channels).unwrap()
+    }
+
+    /// A packet of which about `share` of the shots hit; the second echo often repeats the first.
+    fn packet(rng: &mut ChaCha8Rng, mode: ReturnMode, share: f64) -> [u8; LEN] {
+        let mut blocks = [RawBlock::default(); BLOCKS];
+        for number in 0..BLOCKS {
+            let row = number / mode.returns();
+            blocks[number].azimuth_centideg = (35_900 + 39 * row as u16) % TURN_CENTIDEG;
+            for shot in 0..CHANNELS {
+                let range = rng.random_range(1..=u16::MAX);
+                let range = if rng.random_bool(share) { range } else { 0 };
+                let intensity = rng.random();
+                let repeated = number % mode.returns() == 1 && rng.random_bool(0.3);
+                blocks[number].returns[shot] = match repeated {
+                    true => blocks[number - 1].returns[shot],
+                    false => RawReturn { range, intensity },
+                };
+            }
+        }
+        encode(&blocks, 1_000_000, mode, 0x22)
+    }
+
+    /// The same shot by shot.
+    fn one_by_one(beams: &Beams, payload: &[u8], place: Place, out: &mut Decoded) {
+        let packet = Packet::new(payload).unwrap();
+        let rotation = FIRING.rotation(&packet, 0.0);
+        let stride = packet.return_mode().returns();
+        for row in 0..BLOCKS / stride {
+            let time = place.time + rotation.start_ns(row);
+            let rate = rotation.rate_rad_per_ns();
+            let place = Place { time, ..place };
+            let mut shots = Shots::new(rotation.azimuth_rad(row), rate, place, RANGE_UNIT_M);
+            let block = row * stride;
+            let [first, second] = [block, block + stride - 1].map(|block| packet.echoes(block));
+            for shot in 0..CHANNELS {
+                let firing_ns = (shot / 16) as i64 * FIRING_NS;
+                let channel = Channel::new(&beams.channels()[shot % 16], firing_ns);
+                if stride == 2 {
+                    shots.pair(&channel, [first[shot], second[shot]], block, out);
+                } else {
+                    let kind = single_kind(packet.return_mode());
+                    shots.aim(&channel);
+                    shots.echo(&channel, first[shot], 0, kind, block, out);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn shots_side_by_side_are_those_one_by_one() {
+        let mut rng = ChaCha8Rng::seed_from_u64(16);
+        let beams = beams();
+        let mut decoder = FIRING.decoder(&beams).unwrap();
+        let place = Place {
+            time: Timestamp(1_718_000_000_000_000_000),
+            packet: 7,
+            mean_rate_rad_per_ns: 0.0,
+        };
+        for mode in [ReturnMode::Strongest, ReturnMode::Last, ReturnMode::Dual] {
+            for share in [0.0, 0.05, 0.6, 1.0] {
+                let payload = packet(&mut rng, mode, share);
+                let (mut found, mut expected) = (Decoded::default(), Decoded::default());
+                decoder.decode(&payload, place, &mut found);
+                one_by_one(&beams, &payload, place, &mut expected);
+                assert_eq!(expected.cloud.is_empty(), share == 0.0);
+                assert_eq!(
+                    format!("{found:?}"),
+                    format!("{expected:?}"),
+                    "{mode:?}, {share}"
+                );
             }
         }
     }
