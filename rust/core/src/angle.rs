@@ -5,11 +5,16 @@ use std::f64::consts::{PI, TAU};
 /// `angle_rad` brought into [0, 2 pi).
 #[inline]
 pub fn wrap_turn(angle_rad: f64) -> f64 {
-    // Mostly within a turn of it already: the same without the division.
-    if (0.0..TAU).contains(&angle_rad) {
+    // Mostly not far outside of it: the same to the bit without the division.
+    let wrapped = if (0.0..TAU).contains(&angle_rad) {
         return angle_rad;
-    }
-    let wrapped = angle_rad.rem_euclid(TAU);
+    } else if -TAU < angle_rad && angle_rad < 0.0 {
+        angle_rad + TAU
+    } else if (TAU..2.0 * TAU).contains(&angle_rad) {
+        angle_rad - TAU
+    } else {
+        angle_rad.rem_euclid(TAU)
+    };
     // rem_euclid of a tiny negative number rounds up to the modulus itself.
     if wrapped >= TAU { 0.0 } else { wrapped }
 }
@@ -51,6 +56,23 @@ mod tests {
         assert_eq!(wrap_turn(TAU), 0.0);
         assert_eq!(wrap_turn(-1e-18), 0.0);
         assert!((wrap_turn(-0.1) - (TAU - 0.1)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn angles_near_a_turn_are_wrapped_as_all_others() {
+        let plain = |angle_rad: f64| match angle_rad.rem_euclid(TAU) {
+            wrapped if wrapped >= TAU => 0.0,
+            wrapped => wrapped,
+        };
+        let ends = [0.0, TAU, 2.0 * TAU].into_iter().flat_map(|end| {
+            let (up, down) = (f64::from_bits(end.to_bits() + 1), end.next_down());
+            [end, -end, up, -up, down, -down]
+        });
+        let between = (-4000..4000).map(|step| f64::from(step) * 0.005_432_1);
+        for angle_rad in ends.chain(between) {
+            let (found, expected) = (wrap_turn(angle_rad), plain(angle_rad));
+            assert_eq!(found.to_bits(), expected.to_bits(), "{angle_rad}");
+        }
     }
 
     #[test]

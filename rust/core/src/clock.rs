@@ -49,8 +49,10 @@ impl Unroller {
             None => return Timestamp(stamp_ns),
             Some(wrap_ns) => (wrap_ns, stamp_ns),
         };
-        let ahead_ns = (i128::from(stamp_ns) - i128::from(expected.0)).rem_euclid(wrap_ns.into());
-        let ahead_ns = ahead_ns as i64; // below wrap_ns
+        let ahead_ns = match stamp_ns.checked_sub(expected.0) {
+            Some(ahead_ns) => ahead_ns.rem_euclid(wrap_ns),
+            None => remainder(stamp_ns, expected.0, wrap_ns),
+        };
         let nearest_ns = if ahead_ns > wrap_ns / 2 {
             ahead_ns - wrap_ns
         } else {
@@ -63,6 +65,11 @@ impl Unroller {
     pub fn follow(&mut self, host: Timestamp, device: Timestamp) {
         self.anchor = Some(TimePair { host, device });
     }
+}
+
+/// A difference that needs more than 64 bits, brought into [0, `wrap_ns`).
+fn remainder(stamp_ns: i64, expected_ns: i64, wrap_ns: i64) -> i64 {
+    (i128::from(stamp_ns) - i128::from(expected_ns)).rem_euclid(wrap_ns.into()) as i64
 }
 
 /// How device times become UTC.

@@ -74,6 +74,12 @@ impl<To, From> RigidTransform<To, From> {
         self.isometry.rotation.to_rotation_matrix()
     }
 
+    /// Rotation part as a quaternion of length 1: its vector and its scalar.
+    pub fn quaternion(&self) -> ([f64; 3], f64) {
+        let quaternion = &self.isometry.rotation;
+        (quaternion.imag().into(), quaternion.scalar())
+    }
+
     /// Position of the origin of `From` in `To`, metres.
     pub fn translation_m(&self) -> Vector3<f64> {
         self.isometry.translation.vector

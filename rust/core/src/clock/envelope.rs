@@ -14,6 +14,8 @@ const NEAR_NS: f64 = 2e6;
 pub struct Envelope {
     bins: Vec<Bin>,
     width_ns: i64,
+    /// Where the newest bin ends.
+    end: Timestamp,
     packets: u64,
 }
 
@@ -36,6 +38,7 @@ impl Default for Envelope {
         Self {
             bins: Vec::new(),
             width_ns: NANOS_PER_SECOND,
+            end: Timestamp(i64::MIN),
             packets: 0,
         }
     }
@@ -46,27 +49,31 @@ impl Envelope {
     pub fn add(&mut self, device: Timestamp, offset_ns: i64) {
         self.packets += 1;
         let bin = Bin { device, offset_ns };
-        let number = |at: Timestamp, first: Timestamp| (at - first).max(0) / self.width_ns;
         let first = self.bins.first().map_or(device, |bin| bin.device);
         match self.bins.last_mut() {
-            Some(last) if number(device, first) <= number(last.device, first) => {
-                if offset_ns < last.offset_ns {
-                    // The first bin's time is where all bins are counted from.
-                    *last = if last.device == first {
-                        Bin {
-                            device: first,
-                            ..bin
-                        }
-                    } else {
-                        bin
-                    };
+            Some(last) if device < self.end => {
+                if offset_ns >= last.offset_ns {
+                    return;
                 }
+                // The first bin's time is where all bins are counted from.
+                let is_first = last.device == first;
+                let device = if is_first { first } else { device };
+                *last = Bin { device, offset_ns };
             }
             _ => self.bins.push(bin),
         }
         if self.bins.len() > MAX_BINS {
             self.widen();
         }
+        self.end = self.newest_end();
+    }
+
+    fn newest_end(&self) -> Timestamp {
+        let ends = self.bins.first().zip(self.bins.last());
+        ends.map_or(Timestamp(i64::MIN), |(first, last)| {
+            let number = (last.device - first.device).max(0) / self.width_ns;
+            first.device + number.saturating_add(1).saturating_mul(self.width_ns)
+        })
     }
 
     fn widen(&mut self) {

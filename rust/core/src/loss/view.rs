@@ -78,8 +78,11 @@ impl FieldOfView {
 fn bins(arc: Arc) -> impl Iterator<Item = usize> {
     let start = wrap_turn(arc.from_rad) / BIN_RAD;
     let first = start as usize;
-    let end = (start + arc.width_rad.clamp(0.0, TAU) / BIN_RAD).ceil() as usize;
-    (first..end.min(first + BINS)).map(|bin| bin % BINS)
+    let end = start + arc.width_rad.clamp(0.0, TAU) / BIN_RAD;
+    // Rounded up, which is a call where not all machines can.
+    let end = end as usize + usize::from((end as usize as f64) < end);
+    let within = |bin: usize| if bin < BINS { bin } else { bin - BINS };
+    (first..end.min(first + BINS)).map(within)
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use nalgebra::Point3;
 
+use super::inside::Inside;
 use super::passthrough::PassThrough;
 use crate::cloud::PointCloud;
 use crate::error::InvalidValue;
@@ -191,49 +192,43 @@ pub fn share_of(
     pass: &PassThrough,
 ) -> (Timestamp, Share) {
     let echoes = &sweep.cloud;
-    let places = may_pass(echoes, stands, pass);
-    let mut share = Share {
-        present: true,
-        points_m: Vec::with_capacity(places.len()),
-        rings: Vec::with_capacity(places.len()),
-        lost_on_blade: false,
-    };
-    let mut seen: Option<Gap> = None; // first and last shot that passed
-    for index in places {
-        let Some(stand) = stands.at(echoes.time_ns[index]) else {
-            continue; // on the move
-        };
-        let point = Point3::from(echoes.xyz_m[index].map(f64::from));
-        let point = stand.pose.transform(&point);
-        let point = [point.x as f32, point.y as f32, point.z as f32];
-        if pass.contains(&point) {
-            share.points_m.push(point);
-            share.rings.push(echoes.ring[index]);
-            let time = Timestamp(echoes.time_ns[index]);
-            seen = Some(Gap {
-                from: seen.map_or(time, |s| s.from.min(time)),
-                to: time,
-            });
-        }
-    }
+    let Inside { points_m, places } = passing(echoes, stands, pass);
+    let place = |place: &u32| *place as usize;
+    let rings = places.iter().map(|p| echoes.ring[place(p)]).collect();
+    let times = || places.iter().map(|p| Timestamp(echoes.time_ns[place(p)]));
+    let seen = times().min().zip(times().next_back());
+    let seen = seen.map(|(from, to)| Gap { from, to }); // first and last shot that passed
     // Where nothing is left of the blade, any gap may have held it.
     let overlaps = |gap: &Gap| {
         seen.is_none_or(|s| gap.from <= s.to + NEAR_BLADE_NS && s.from <= gap.to + NEAR_BLADE_NS)
     };
-    share.lost_on_blade = sweep.gaps.iter().any(overlaps);
+    let share = Share {
+        present: true,
+        points_m,
+        rings,
+        lost_on_blade: sweep.gaps.iter().any(overlaps),
+    };
     (sweep.start + (sweep.end - sweep.start) / 2, share)
 }
 
-/// Places of the echoes that may lie in the box; those of a lidar that was moved all may.
-fn may_pass(echoes: &ShareEchoes, stands: &Stands, pass: &PassThrough) -> Vec<usize> {
-    let mut places = Vec::new();
-    match stands.only() {
-        Some(stand) => pass
-            .near(&stand.pose)
-            .places(&echoes.xyz_m, |place| places.push(place)),
-        None => places.extend(0..echoes.count()),
+/// Echoes in the box, of which those of a lidar that was moved are looked at one by one.
+fn passing(echoes: &ShareEchoes, stands: &Stands, pass: &PassThrough) -> Inside {
+    if let Some(stand) = stands.only() {
+        return pass.view(&stand.pose).inside(&echoes.xyz_m);
     }
-    places
+    let mut inside = Inside::default();
+    for (place, (xyz_m, time_ns)) in (0..).zip(echoes.xyz_m.iter().zip(&echoes.time_ns)) {
+        let Some(stand) = stands.at(*time_ns) else {
+            continue; // on the move
+        };
+        let point = stand.pose.transform(&Point3::from(xyz_m.map(f64::from)));
+        let point = [point.x as f32, point.y as f32, point.z as f32];
+        if pass.contains(&point) {
+            inside.points_m.push(point);
+            inside.places.push(place);
+        }
+    }
+    inside
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! | step | here |
 //! |---|---|
 //! | 2-4 ground, rotation, yaw | [`crate::register`] |
-//! | 5 pass-through | [`passthrough`], told quickly by [`near`] |
+//! | 5 pass-through | [`passthrough`], side by side [`inside`], told quickly by [`near`] |
 //! | frames on the common clock | [`frames`], out of datagrams [`reader`] |
 //! | 6 dynamic-radius DBSCAN (9), (10) | [`crate::cluster`] |
 //! | 7 extremes of the scan lines | [`crate::blade::contour`] |
@@ -17,6 +17,7 @@
 pub mod curves;
 pub mod frame;
 pub mod frames;
+pub mod inside;
 pub mod kept;
 pub mod near;
 pub mod passthrough;

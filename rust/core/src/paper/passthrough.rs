@@ -2,6 +2,7 @@
 
 use nalgebra::Point3;
 
+use super::inside::BoxView;
 use super::near::NearBox;
 use crate::angle::{Arc, wrap_turn};
 use crate::error::InvalidValue;
@@ -61,6 +62,11 @@ impl PassThrough {
     /// What tells quickly which points of a lidar may lie in the box.
     pub fn near(&self, pose: &WorldFromSensor) -> NearBox {
         NearBox::new(pose, &self.min_m, &self.max_m)
+    }
+
+    /// What carries the points of a lidar that lie in the box into the world.
+    pub fn view(&self, pose: &WorldFromSensor) -> BoxView {
+        BoxView::new(pose, self.min_m, self.max_m)
     }
 
     /// The eight corners of the box, a little farther out.

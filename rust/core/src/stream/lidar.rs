@@ -200,7 +200,9 @@ impl Lidar {
             let is_change = last.ticket.head.return_mode != head.return_mode;
             self.mode_changes += u64::from(is_change);
         }
-        self.first.get_or_insert(*ordered);
+        if self.first.is_none() {
+            self.first = Some(*ordered);
+        }
         self.last = Some(*ordered);
     }
 

@@ -137,12 +137,15 @@ fn put(bytes: &mut [u8], range: Range<usize>, value: u64) {
 impl<'a> View<'a> {
     /// Takes a payload of the layout's length that says that it is a data packet; `None` for any other.
     pub fn new(bytes: &'a [u8], layout: Layout) -> Option<Self> {
+        if bytes.len() != layout.packet_len() {
+            return None;
+        }
         let kind = match layout.header {
             Header::Legacy => 1,
             Header::Standard => little(bytes, header::TYPE),
             Header::Safety => little(bytes, header::safety::TYPE),
         };
-        (bytes.len() == layout.packet_len() && kind == 1).then_some(Self { bytes, layout })
+        (kind == 1).then_some(Self { bytes, layout })
     }
 
     /// Sizes.

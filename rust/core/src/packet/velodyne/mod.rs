@@ -113,6 +113,13 @@ impl<'a> Packet<'a> {
         u16::from_le_bytes([bytes[0], bytes[1]])
     }
 
+    /// Encoder azimuths of all blocks, 0.01 degree.
+    #[inline(always)]
+    pub fn azimuths_centideg(&self) -> [u16; BLOCKS] {
+        let (blocks, _) = self.0.as_chunks::<{ field::BLOCK_LEN }>();
+        std::array::from_fn(|block| u16::from_le_bytes([blocks[block][2], blocks[block][3]]))
+    }
+
     /// Echoes of a block by channel.
     pub fn returns(&self, block: usize) -> impl ExactSizeIterator<Item = RawReturn> + 'a {
         let echoes = self.block(block)[field::RETURNS].chunks_exact(field::RETURN_LEN);

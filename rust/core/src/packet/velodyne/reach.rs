@@ -1,8 +1,8 @@
 //! Where the returns of a packet may lie: what is wanted in few directions need not be decoded in all.
 
-use super::rotation::{MAX_ROWS, TURN, steps, within_turn};
+use super::rotation::{MAX_ROWS, TURN, rows_of, steps, within_turn};
 use super::rows::Channel;
-use super::{BLOCKS, CHANNELS, Packet};
+use super::{CHANNELS, Packet};
 use crate::angle::Arc;
 
 /// Nearer than this to the spin axis a return may lie in any direction, metres.
@@ -34,12 +34,7 @@ impl Reach {
     /// Whether a return of the packet may lie in an arc of bearings, which run against azimuths.
     pub fn meets(&self, packet: &Packet<'_>, bearings: Arc) -> bool {
         let Some(aside) = self.aside else { return true };
-        let mut azimuths = [0; MAX_ROWS];
-        let rows = (0..BLOCKS).step_by(packet.return_mode().returns());
-        let count = rows.len();
-        for (azimuth, block) in azimuths.iter_mut().zip(rows) {
-            *azimuth = packet.azimuth_centideg(block);
-        }
+        let (azimuths, count) = rows_of(packet, packet.return_mode().returns());
         let margin = self.rows.saturating_mul(widest_step(&azimuths, count));
         let margin = aside.saturating_add(margin);
         let from = (-100.0 * (bearings.from_rad + bearings.width_rad).to_degrees()).floor() as i32;

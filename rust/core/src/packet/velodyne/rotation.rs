@@ -1,6 +1,6 @@
 //! Azimuth and time along one packet: rows of equal time step, with gaps of a limited field of view.
 
-use super::TURN_CENTIDEG;
+use super::{BLOCKS, Packet, TURN_CENTIDEG};
 use crate::packet::LeftOut;
 
 /// One turn, 0.01 degree.
@@ -8,7 +8,7 @@ pub const TURN: i32 = TURN_CENTIDEG as i32;
 /// Angle of one hundredth of a degree.
 const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
 /// More rows than any packet of the family has.
-pub const MAX_ROWS: usize = 12;
+pub const MAX_ROWS: usize = BLOCKS;
 /// Steps back by less than this are jitter of the encoder, not a gap of nearly a turn; 0.01 degree.
 const BACKLASH_CENTIDEG: i32 = 100;
 /// Steps may always differ by this from the usual one; 0.01 degree.
@@ -46,6 +46,22 @@ impl Rotation {
             *place = azimuth;
             rows += 1;
         }
+        Self::of_rows(raw, rows, row_ns, mean_rate_rad_per_ns)
+    }
+
+    /// The same of the blocks of a packet, `returns` of which make a row.
+    #[inline]
+    pub fn of_blocks(
+        packet: &Packet<'_>,
+        returns: usize,
+        row_ns: i64,
+        mean_rate_rad_per_ns: f64,
+    ) -> Self {
+        let (raw, rows) = rows_of(packet, returns);
+        Self::of_rows(raw, rows, row_ns, mean_rate_rad_per_ns)
+    }
+
+    fn of_rows(raw: [u16; MAX_ROWS], rows: usize, row_ns: i64, mean_rate_rad_per_ns: f64) -> Self {
         let steps = steps(&raw);
         let between = &steps[..rows.saturating_sub(1)];
         let usual = Usual::of(between);
@@ -175,6 +191,20 @@ impl Usual {
     }
 }
 
+/// Azimuths of the rows of a packet, and how many there are.
+#[inline]
+pub fn rows_of(packet: &Packet<'_>, returns: usize) -> ([u16; MAX_ROWS], usize) {
+    let blocks = packet.azimuths_centideg();
+    if returns == 1 {
+        return (blocks, BLOCKS);
+    }
+    let mut raw = [0; MAX_ROWS];
+    for (azimuth, block) in raw.iter_mut().zip(blocks.iter().step_by(returns)) {
+        *azimuth = *block;
+    }
+    (raw, BLOCKS.div_ceil(returns))
+}
+
 /// Forward steps from row to row, 0.01 degree, in [-`BACKLASH_CENTIDEG`, one turn).
 pub fn steps(raw: &[u16; MAX_ROWS]) -> [i32; MAX_ROWS] {
     let mut steps = [0; MAX_ROWS];
@@ -196,8 +226,11 @@ pub fn within_turn(difference: i32) -> i32 {
 
 /// Widest step less the smallest.
 fn spread(steps: &[i32]) -> i32 {
-    let ends = |pick: fn(i32, i32) -> i32| steps.iter().copied().reduce(pick).unwrap_or(0);
-    ends(i32::max) - ends(i32::min)
+    let Some(first) = steps.first() else { return 0 };
+    let ends = steps.iter().fold((*first, *first), |(low, high), step| {
+        (low.min(*step), high.max(*step))
+    });
+    ends.1 - ends.0
 }
 
 fn median(steps: &[i32]) -> i32 {

@@ -78,9 +78,8 @@ impl Firing {
     }
 
     fn rotation(&self, packet: &Packet<'_>, mean_rate_rad_per_ns: f64) -> Rotation {
-        let rows = (0..BLOCKS).step_by(packet.return_mode().returns());
-        let azimuths = rows.map(|block| packet.azimuth_centideg(block));
-        Rotation::new(azimuths, self.row_ns(), mean_rate_rad_per_ns)
+        let returns = packet.return_mode().returns();
+        Rotation::of_blocks(packet, returns, self.row_ns(), mean_rate_rad_per_ns)
     }
 }
 
