@@ -1,6 +1,7 @@
 //! Ouster packets whose sensor is not known: recognised by columns that follow each other, without points.
 
 use std::f64::consts::TAU;
+use std::sync::LazyLock;
 
 use super::layout::{ENCODER_TICKS, Header, Layout, View};
 use super::profile::{PROFILES, Profile};
@@ -65,22 +66,32 @@ fn guess(payload: &[u8]) -> Option<View<'_>> {
 
 /// All layouts of the payload's size whose columns follow each other.
 fn layouts(payload: &[u8]) -> impl Iterator<Item = View<'_>> {
+    let is_size = PACKET_LENS.binary_search(&payload.len()).is_ok();
+    let layouts = is_size.then(all_layouts).into_iter().flatten();
+    let views = layouts.filter_map(|layout| View::new(payload, layout));
+    views.filter(is_sound)
+}
+
+/// Sizes of all packets, ascending: most payloads have none of them.
+static PACKET_LENS: LazyLock<Vec<usize>> = LazyLock::new(|| {
+    let mut lens: Vec<usize> = all_layouts().map(|layout| layout.packet_len()).collect();
+    lens.sort_unstable();
+    lens
+});
+
+fn all_layouts() -> impl Iterator<Item = Layout> {
     let headers = [Header::Standard, Header::Safety, Header::Legacy];
     let sized = headers.into_iter().flat_map(|header| {
         COLUMNS
             .into_iter()
             .flat_map(move |columns| sizes(header).map(move |size| (header, columns, size)))
     });
-    let views = sized.filter_map(|(header, columns, (pixels, pixel_len))| {
-        let layout = Layout {
-            header,
-            columns,
-            pixels,
-            pixel_len,
-        };
-        View::new(payload, layout)
-    });
-    views.filter(is_sound)
+    sized.map(|(header, columns, (pixels, pixel_len))| Layout {
+        header,
+        columns,
+        pixels,
+        pixel_len,
+    })
 }
 
 /// What a layout is, for people.

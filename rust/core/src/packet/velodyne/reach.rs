@@ -63,7 +63,7 @@ mod tests {
     use super::*;
     use crate::angle::wrap_turn;
     use crate::packet::velodyne::puck::VLP16;
-    use crate::packet::velodyne::{RawBlock, RawReturn, encode};
+    use crate::packet::velodyne::{BLOCKS, RawBlock, RawReturn, encode};
     use crate::packet::{Decoded, Place, ReturnMode};
     use crate::time::Timestamp;
     use proptest::prelude::*;
