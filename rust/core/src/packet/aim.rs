@@ -66,6 +66,25 @@ pub fn within_half_turn(angle_rad: f64) -> f64 {
     }
 }
 
+/// Radians of a hundredth of a degree.
+pub const RAD_PER_CENTIDEG: f64 = HALF_TURN / 18_000.0;
+
+/// Sine and cosine of whole hundredths of a degree as rotors tell them.
+static TOLD: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
+    let angle = |number: u32| (f64::from(number) * RAD_PER_CENTIDEG).sin_cos();
+    (0..36_000).map(angle).collect()
+});
+
+/// Sine and cosine of an angle, [0, 2 pi), to the bit; looked up where it is a whole number of
+/// [`RAD_PER_CENTIDEG`], as most rotors tell it.
+#[inline]
+pub fn told(angle_rad: f64) -> (f64, f64) {
+    let number = (angle_rad * (1.0 / RAD_PER_CENTIDEG) + 0.5) as u32;
+    let is_whole = f64::from(number) * RAD_PER_CENTIDEG == angle_rad;
+    let known = TOLD.get(number as usize).filter(|_| is_whole);
+    known.copied().unwrap_or_else(|| angle_rad.sin_cos())
+}
+
 /// Sine and cosine of whole hundredths of a degree.
 static CENTIDEGREES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
     let angle = |number: u32| (f64::from(number) / 100.0).to_radians().sin_cos();
@@ -157,6 +176,19 @@ mod tests {
         for step in -4000..4000 {
             let angle = f64::from(step) * 0.01;
             assert_eq!(wrapped_far(angle), wrapped(angle.rem_euclid(TAU)));
+        }
+    }
+
+    #[test]
+    fn angles_that_are_looked_up_have_the_bits_of_all_others() {
+        for number in 0..40_000 {
+            for angle_rad in [
+                f64::from(number) * RAD_PER_CENTIDEG,
+                f64::from(number).to_radians() / 100.0,
+                f64::from(number) * 1e-4,
+            ] {
+                assert_eq!(told(angle_rad), angle_rad.sin_cos());
+            }
         }
     }
 

@@ -251,6 +251,7 @@ impl ReturnMode {
     }
 
     /// Echoes that a packet has room for in each shot.
+    #[inline]
     pub fn returns(self) -> usize {
         match self {
             Self::Strongest | Self::Last | Self::First | Self::Second => 1,

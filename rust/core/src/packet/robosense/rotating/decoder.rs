@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::turn::Turn;
 use super::{Family, GUARD_M, Lens, Settings, Slot};
-use crate::packet::aim::{add, small_turn};
+use crate::packet::aim::{add, small_turn, told};
 use crate::packet::fan::{Beam, Desk, Known, Row, from_x};
 use crate::packet::robosense::difop::Angles;
 use crate::packet::robosense::layout::View;
@@ -240,7 +240,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             let row = Row {
                 encoder_rad,
                 azimuth_rad: encoder_rad,
-                axes: from_x(encoder_rad.sin_cos()),
+                axes: from_x(told(encoder_rad)),
                 origin_m: [0.0; 3],
                 unit_m,
                 time_ns: (place.time + turn.start_ns(firing)).0,
