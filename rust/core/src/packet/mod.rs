@@ -18,6 +18,7 @@ pub mod ouster;
 pub mod points;
 pub mod proof;
 pub mod robosense;
+pub mod sheet;
 pub mod split;
 mod strangers;
 pub mod unit;

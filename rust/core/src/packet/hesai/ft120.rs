@@ -303,6 +303,7 @@ impl Decoder for Ft120Decoder {
         };
         let return_kind = single_kind(packet.view.return_mode());
         self.desk.push_single(fan, None, &row, return_kind, out);
+        self.desk.flush(out);
     }
 }
 

@@ -192,5 +192,6 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
         for first in firings(&view) {
             self.firing(&view, first, place, out);
         }
+        self.desk.flush(out);
     }
 }

@@ -221,5 +221,6 @@ impl Decoder for CxDecoder {
             };
             self.desk.push(fan, None, &row, mode, out);
         }
+        self.desk.flush(out);
     }
 }

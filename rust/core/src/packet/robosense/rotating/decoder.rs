@@ -225,13 +225,16 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                     .map(|shot| shot.map_or(Beam::default(), aimed))
                     .collect()
             });
+            let next = shared.filter(|_| firing + 1 == turn.firings());
+            if next.is_some() {
+                self.desk.flush(out);
+            }
             self.desk.open(fan.len(), returns);
             let mut held = 0;
             for block in turn.blocks_of(firing) {
                 wiring.fill(&view, block, &kept, &mut self.desk);
                 held += 1;
             }
-            let next = shared.filter(|_| firing + 1 == turn.firings());
             if let Some((next, _)) = &next {
                 wiring.fill(next, (0, held), &kept, &mut self.desk);
             }
@@ -248,5 +251,6 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             };
             self.desk.push(fan, None, &row, mode, out);
         }
+        self.desk.flush(out);
     }
 }
