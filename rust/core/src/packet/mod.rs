@@ -5,7 +5,6 @@
 //! the library names a model.
 
 pub mod aim;
-pub mod batch;
 pub mod beams;
 pub mod echoes;
 pub mod fan;
@@ -17,6 +16,7 @@ mod models;
 pub mod ouster;
 pub mod points;
 pub mod proof;
+pub mod rays;
 pub mod robosense;
 pub mod sheet;
 pub mod split;
