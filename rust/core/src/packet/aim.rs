@@ -66,6 +66,25 @@ pub fn within_half_turn(angle_rad: f64) -> f64 {
     }
 }
 
+/// Radians of a hundredth of a degree.
+pub const RAD_PER_CENTIDEG: f64 = HALF_TURN / 18_000.0;
+
+/// Sine and cosine of whole hundredths of a degree as rotors tell them.
+static TOLD: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
+    let angle = |number: u32| (f64::from(number) * RAD_PER_CENTIDEG).sin_cos();
+    (0..36_000).map(angle).collect()
+});
+
+/// Sine and cosine of an angle, [0, 2 pi), to the bit; looked up where it is a whole number of
+/// [`RAD_PER_CENTIDEG`], as most rotors tell it.
+#[inline]
+pub fn told(angle_rad: f64) -> (f64, f64) {
+    let number = (angle_rad * (1.0 / RAD_PER_CENTIDEG) + 0.5) as u32;
+    let is_whole = f64::from(number) * RAD_PER_CENTIDEG == angle_rad;
+    let known = TOLD.get(number as usize).filter(|_| is_whole);
+    known.copied().unwrap_or_else(|| angle_rad.sin_cos())
+}
+
 /// Sine and cosine of whole hundredths of a degree.
 static CENTIDEGREES: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
     let angle = |number: u32| (f64::from(number) / 100.0).to_radians().sin_cos();
@@ -83,14 +102,18 @@ impl Centidegrees {
     }
 
     /// Sine and cosine of an angle of so many hundredths of a degree, of whatever turn.
-    #[inline]
+    #[inline(always)]
     pub fn sin_cos(self, angle: i32) -> (f64, f64) {
-        let place = angle.rem_euclid(36_000);
+        let place = if (0..36_000).contains(&angle) {
+            angle
+        } else {
+            angle.rem_euclid(36_000)
+        };
         self.0.get(place as usize).copied().unwrap_or((0.0, 1.0))
     }
 
     /// The angle in radians, [0, 2 pi) of `f32`.
-    #[inline]
+    #[inline(always)]
     pub fn wrapped(self, angle: i32) -> f32 {
         wrapped(f64::from(angle.rem_euclid(36_000)) * (TAU / 36_000.0))
     }
@@ -101,7 +124,7 @@ impl Centidegrees {
 ///
 /// The arc tangent of the smaller over the larger number, brought below tan(pi/8), by the polynomial of
 /// the Cephes library (S. L. Moshier).
-#[inline]
+#[inline(always)]
 pub fn bearing(x: f32, y: f32) -> f32 {
     const TAN_PI_8: f32 = 0.414_213_57;
     let (ahead, aside) = (x.abs(), y.abs());
@@ -124,19 +147,11 @@ pub fn bearing(x: f32, y: f32) -> f32 {
     if whole >= TAU as f32 { 0.0 } else { whole }
 }
 
-/// Azimuths of positions, from x towards y.
-pub fn bear(xyz_m: &[[f32; 3]], azimuths_rad: &mut [f32]) {
-    for (azimuth_rad, [x, y, _]) in azimuths_rad.iter_mut().zip(xyz_m) {
-        *azimuth_rad = bearing(*x, *y);
-    }
-}
-
-/// Distances of positions from the origin.
-pub fn reach(xyz_m: &[[f32; 3]], ranges_m: &mut [f32]) {
-    for (range_m, position) in ranges_m.iter_mut().zip(xyz_m) {
-        let [x, y, z] = position.map(f64::from);
-        *range_m = (x * x + y * y + z * z).sqrt() as f32;
-    }
+/// Distance of a position from the origin.
+#[inline(always)]
+pub fn reach(position: [f32; 3]) -> f32 {
+    let [x, y, z] = position.map(f64::from);
+    (x * x + y * y + z * z).sqrt() as f32
 }
 
 #[cfg(test)]
@@ -157,6 +172,19 @@ mod tests {
         for step in -4000..4000 {
             let angle = f64::from(step) * 0.01;
             assert_eq!(wrapped_far(angle), wrapped(angle.rem_euclid(TAU)));
+        }
+    }
+
+    #[test]
+    fn angles_that_are_looked_up_have_the_bits_of_all_others() {
+        for number in 0..40_000 {
+            for angle_rad in [
+                f64::from(number) * RAD_PER_CENTIDEG,
+                f64::from(number).to_radians() / 100.0,
+                f64::from(number) * 1e-4,
+            ] {
+                assert_eq!(told(angle_rad), angle_rad.sin_cos());
+            }
         }
     }
 

@@ -9,14 +9,10 @@ mod known;
 
 use super::aim::{within_half_turn, wrapped};
 use super::echoes::MOST;
+use super::sheet::{LANES, Lane, Sheet, lane, lane_mut};
 use crate::simd::{Kernel, vectorized};
 pub use desk::{Desk, single_kind};
 pub use known::Known;
-
-/// Shots of a chunk.
-const LANES: usize = 16;
-
-type Lane<T> = [T; LANES];
 
 /// One shot, in the frame of the rotor.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -38,12 +34,13 @@ pub struct Beam {
 /// The shots of a firing, quantity by quantity.
 #[derive(Debug, Clone, Default)]
 pub struct Fan {
-    ring: Vec<u16>,
+    len: usize,
     chunks: Vec<Chunk>,
 }
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Chunk {
+    ring: Lane<u16>,
     delay_ns: Lane<i64>,
     turned_rad: Lane<f64>,
     azimuth_rad: Lane<f64>,
@@ -54,13 +51,13 @@ struct Chunk {
 impl Fan {
     /// Takes the place of the shots that were there.
     pub fn set(&mut self, beams: impl IntoIterator<Item = Beam>) {
-        self.ring.clear();
+        self.len = 0;
         self.chunks.clear();
         for (lane, beam) in (0..LANES).cycle().zip(beams) {
             if lane == 0 {
                 self.chunks.push(Chunk::default());
             }
-            self.ring.push(beam.ring);
+            self.len += 1;
             if let Some(chunk) = self.chunks.last_mut() {
                 chunk.set(lane, &beam);
             }
@@ -69,12 +66,12 @@ impl Fan {
 
     /// Number of shots.
     pub fn len(&self) -> usize {
-        self.ring.len()
+        self.len
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.ring.is_empty()
+        self.len == 0
     }
 }
 
@@ -88,6 +85,7 @@ impl FromIterator<Beam> for Fan {
 
 impl Chunk {
     fn set(&mut self, lane: usize, beam: &Beam) {
+        self.ring[lane] = beam.ring;
         self.delay_ns[lane] = beam.delay_ns;
         self.turned_rad[lane] = within_half_turn(beam.turned_rad);
         self.azimuth_rad[lane] = within_half_turn(beam.azimuth_rad);
@@ -127,58 +125,11 @@ pub fn from_x((sin, cos): (f64, f64)) -> [[f64; 3]; 3] {
     [[cos, -sin, 0.0], [-sin, -cos, 0.0], [0.0, 0.0, 1.0]]
 }
 
-/// The shots of a chunk, placed as if all of them had hit.
-#[derive(Debug, Clone, Copy)]
-struct Placed {
-    encoder_rad: Lane<f32>,
-    azimuth_rad: Lane<f32>,
-    range_m: Lane<f32>,
-    xyz_m: Lane<[f32; 3]>,
-    time_ns: Lane<i64>,
-}
-
-/// The same of all chunks and returns, one return behind the other.
-#[derive(Debug, Default)]
-struct Spots {
-    encoder_rad: Vec<Lane<f32>>,
-    azimuth_rad: Vec<Lane<f32>>,
-    range_m: Vec<Lane<f32>>,
-    xyz_m: Vec<Lane<[f32; 3]>>,
-    time_ns: Vec<Lane<i64>>,
-}
-
-impl Spots {
-    fn resize(&mut self, chunks: usize) {
-        self.encoder_rad.resize(chunks, [0.0; LANES]);
-        self.azimuth_rad.resize(chunks, [0.0; LANES]);
-        self.range_m.resize(chunks, [0.0; LANES]);
-        self.xyz_m.resize(chunks, [[0.0; 3]; LANES]);
-        self.time_ns.resize(chunks, [0; LANES]);
-    }
-
-    #[inline(always)]
-    fn put(&mut self, chunk: usize, placed: &Placed) {
-        self.encoder_rad[chunk] = placed.encoder_rad;
-        self.azimuth_rad[chunk] = placed.azimuth_rad;
-        self.range_m[chunk] = placed.range_m;
-        self.xyz_m[chunk] = placed.xyz_m;
-        self.time_ns[chunk] = placed.time_ns;
-    }
-
-    fn copy(&mut self, from: &Self, entry: usize) {
-        let (chunk, lane) = (entry / LANES, entry % LANES);
-        self.azimuth_rad[chunk][lane] = from.azimuth_rad[chunk][lane];
-        self.xyz_m[chunk][lane] = from.xyz_m[chunk][lane];
-        self.time_ns[chunk][lane] = from.time_ns[chunk][lane];
-    }
-}
-
-/// Places all chunks of all returns.
+/// Places all chunks of all returns of a firing.
 struct Place<'a> {
     fan: &'a Fan,
     row: &'a Row,
-    ranges: &'a [Lane<i32>],
-    spots: &'a mut Spots,
+    sheet: &'a mut Sheet,
 }
 
 impl Kernel for Place<'_> {
@@ -186,48 +137,45 @@ impl Kernel for Place<'_> {
 
     #[inline(always)]
     fn run(self) {
-        let chunks = self.fan.chunks.iter().cycle();
-        for (number, (range, chunk)) in self.ranges.iter().zip(chunks).enumerate() {
-            self.spots.put(number, &placed(self.row, chunk, range));
+        let Self { fan, row, sheet } = self;
+        for first in sheet.firing().step_by(fan.len().max(1)) {
+            for (chunk, at) in fan.chunks.iter().zip((first..).step_by(LANES)) {
+                place_chunk(row, chunk, at, sheet);
+            }
         }
     }
 }
 
+/// Places the shots of a chunk as if all of them had hit.
 #[inline(always)]
-fn placed(row: &Row, chunk: &Chunk, ranges: &Lane<i32>) -> Placed {
-    let mut placed = Placed {
-        encoder_rad: [0.0; LANES],
-        azimuth_rad: [0.0; LANES],
-        range_m: [0.0; LANES],
-        xyz_m: [[0.0; 3]; LANES],
-        time_ns: chunk.delay_ns.map(|delay| row.time_ns.wrapping_add(delay)),
-    };
+fn place_chunk(row: &Row, chunk: &Chunk, at: usize, sheet: &mut Sheet) {
+    *lane_mut(&mut sheet.ring, at) = chunk.ring;
+    let time_ns = lane_mut(&mut sheet.time_ns, at);
+    let encoder_rad = lane_mut(&mut sheet.encoder_rad, at);
+    let azimuth_rad = lane_mut(&mut sheet.azimuth_rad, at);
     for k in 0..LANES {
-        placed.encoder_rad[k] = wrapped(row.encoder_rad + chunk.turned_rad[k]);
-        placed.azimuth_rad[k] = wrapped(row.azimuth_rad + chunk.azimuth_rad[k]);
+        time_ns[k] = row.time_ns.wrapping_add(chunk.delay_ns[k]);
+        encoder_rad[k] = wrapped(row.encoder_rad + chunk.turned_rad[k]);
+        azimuth_rad[k] = wrapped(row.azimuth_rad + chunk.azimuth_rad[k]);
     }
+    let ranges = lane(&sheet.range, at);
+    let ranges_m = lane_mut(&mut sheet.range_m, at);
+    let xyz_m = lane_mut(&mut sheet.xyz_m, at);
     let [x, y, z] = row.axes;
-    for (k, range) in ranges.iter().enumerate() {
-        let range_m = f64::from(*range) * row.unit_m;
+    for k in 0..LANES {
+        let range_m = f64::from(ranges[k]) * row.unit_m;
         let at = |axis: usize| range_m * chunk.direction[axis][k] + chunk.origin_m[axis][k];
         let (ahead, aside, up) = (at(0), at(1), at(2));
         let along = |axis: [f64; 3]| axis[0] * ahead + axis[1] * aside + axis[2] * up;
-        placed.range_m[k] = range_m as f32;
-        placed.xyz_m[k] = [
+        ranges_m[k] = range_m as f32;
+        xyz_m[k] = [
             (along(x) + row.origin_m[0]) as f32,
             (along(y) + row.origin_m[1]) as f32,
             (along(z) + row.origin_m[2]) as f32,
         ];
     }
-    placed
 }
 
-fn place(fan: &Fan, row: &Row, ranges: &[Lane<i32>], spots: &mut Spots) {
-    spots.resize(ranges.len());
-    vectorized(Place {
-        fan,
-        row,
-        ranges,
-        spots,
-    });
+fn place(fan: &Fan, row: &Row, sheet: &mut Sheet) {
+    vectorized(Place { fan, row, sheet });
 }

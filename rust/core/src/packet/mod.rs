@@ -5,7 +5,6 @@
 //! the library names a model.
 
 pub mod aim;
-pub mod batch;
 pub mod beams;
 pub mod echoes;
 pub mod fan;
@@ -18,7 +17,9 @@ pub mod ouster;
 pub mod part;
 pub mod points;
 pub mod proof;
+pub mod rays;
 pub mod robosense;
+pub mod sheet;
 pub mod split;
 mod strangers;
 pub mod unit;
@@ -252,6 +253,7 @@ impl ReturnMode {
     }
 
     /// Echoes that a packet has room for in each shot.
+    #[inline]
     pub fn returns(self) -> usize {
         match self {
             Self::Strongest | Self::Last | Self::First | Self::Second => 1,

@@ -1,39 +1,24 @@
 //! The echoes of one firing, and what is made of them.
 
-use super::{Fan, LANES, Lane, Row, Spots, place};
+use super::{Fan, Row, place};
 use crate::cloud::ReturnKind;
 use crate::packet::echoes::{MOST, RawEcho, judge};
+use crate::packet::sheet::Sheet;
 use crate::packet::{Decoded, ReturnMode};
 
-/// A shot that hit.
-#[derive(Debug, Clone, Copy)]
-struct Hit {
-    /// Among the echoes of the desk.
-    entry: u16,
-    lane: u16,
-    /// Among the returns of the shot.
-    echo: u8,
-    return_kind: ReturnKind,
-}
+/// Echoes beyond which they are appended without waiting for the next firing, so that they stay in the fastest memory.
+const ENOUGH: usize = 256;
 
-const NO_HIT: Hit = Hit {
-    entry: 0,
-    lane: 0,
-    echo: 0,
-    return_kind: ReturnKind::Strongest,
-};
-
-/// The echoes of a firing, and what is made of them. Meant to be used again and again.
+/// The echoes of firings, and what is made of them. Meant to be used again and again.
 #[derive(Debug, Default)]
 pub struct Desk {
-    lanes: usize,
-    chunks: usize, // of one return
-    range: Vec<Lane<i32>>,
-    intensity: Vec<Lane<u16>>,
-    block: Vec<Lane<u16>>,
-    spots: Spots,
-    near: Spots,
-    hits: Vec<Hit>,
+    /// Those that are not appended yet, one firing and one return behind the other.
+    sheet: Sheet,
+    near: Sheet,
+    /// Numbers of the packets that hold their returns.
+    packets: [u32; MOST],
+    /// What they are where shots have one return.
+    single: Option<ReturnKind>,
 }
 
 /// Echoes of one return of all shots, to be filled in.
@@ -47,35 +32,29 @@ pub struct Echoes<'a> {
 }
 
 impl Desk {
-    /// Makes room for the echoes of `lanes` shots; there are none yet.
+    /// Makes room for the echoes of a firing of `lanes` shots; there are none yet.
     pub fn open(&mut self, lanes: usize, returns: usize) {
-        self.lanes = lanes;
-        self.chunks = lanes.div_ceil(LANES);
-        let chunks = self.chunks * returns;
-        self.range.clear();
-        self.range.resize(chunks, [0; LANES]);
-        self.intensity.resize(chunks, [0; LANES]);
-        self.block.resize(chunks, [0; LANES]);
-        self.hits.clear();
+        self.sheet.add(lanes, returns);
     }
 
     /// Echoes of the return with this number.
     pub fn echoes(&mut self, echo: usize) -> Echoes<'_> {
-        let range = echo * self.chunks * LANES..echo * self.chunks * LANES + self.lanes;
+        let range = self.sheet.echoes(echo);
         Echoes {
-            range: &mut self.range.as_flattened_mut()[range.clone()],
-            intensity: &mut self.intensity.as_flattened_mut()[range.clone()],
-            block: &mut self.block.as_flattened_mut()[range],
+            range: &mut self.sheet.range[range.clone()],
+            intensity: &mut self.sheet.intensity[range.clone()],
+            block: &mut self.sheet.block[range],
         }
     }
 
     /// Range of an echo.
     #[inline]
     pub fn range(&self, lane: usize, echo: usize) -> i32 {
-        self.range.as_flattened()[echo * self.chunks * LANES + lane]
+        self.sheet.range[self.sheet.echoes(echo).start + lane]
     }
 
-    /// Appends the returns of a firing.
+    /// Places the echoes of a firing; their returns are appended when there are enough of them, or by [`Desk::flush`].
+    /// Those of one packet alone wait together.
     ///
     /// Targets nearer than so many metres are shot by the second fan, which has the same beams at other times.
     pub fn push(
@@ -89,7 +68,7 @@ impl Desk {
         if mode.returns() == 1 {
             return self.push_single(fan, near, row, single_kind(mode), out);
         }
-        out.merged += self.judge(mode);
+        out.merged += self.sheet.judge(mode);
         self.finish(fan, near, row, out);
     }
 
@@ -102,136 +81,64 @@ impl Desk {
         return_kind: ReturnKind,
         out: &mut Decoded,
     ) {
-        let ranges = &self.range.as_flattened()[..self.lanes];
-        if ranges.iter().all(|range| *range != 0) {
-            self.place(fan, near, row);
-            return self.keep_all(fan, row, return_kind, out);
-        }
-        let hits = (0..).zip(ranges).filter(|(_, range)| **range != 0);
-        self.hits.extend(hits.map(|(lane, _)| Hit {
-            entry: lane,
-            lane,
-            echo: 0,
-            return_kind,
-        }));
-        self.finish(fan, near, row, out);
+        self.single = Some(return_kind);
+        self.hold(fan, near, row, out);
     }
 
-    /// Appends the returns that were told by [`Desk::hit`].
+    /// The same where [`Desk::hit`] told the returns.
     pub fn finish(&mut self, fan: &Fan, near: Option<(&Fan, f64)>, row: &Row, out: &mut Decoded) {
-        if !self.hits.is_empty() {
-            self.place(fan, near, row);
-            self.keep(fan, row, out);
-        }
+        self.single = None;
+        self.hold(fan, near, row, out);
     }
 
     /// Tells what an echo is. Shots come in their order.
     #[inline]
     pub fn hit(&mut self, lane: usize, echo: usize, return_kind: ReturnKind) {
-        self.hits.push(Hit {
-            entry: (echo * self.chunks * LANES + lane) as u16,
-            lane: lane as u16,
-            echo: echo as u8,
-            return_kind,
-        });
+        let entry = self.sheet.echoes(echo).start + lane;
+        self.sheet.hit(entry, echo, return_kind);
     }
 
-    /// Finds what the echoes are; gives how many were merged into others.
-    fn judge(&mut self, mode: ReturnMode) -> u64 {
-        let returns = mode.returns();
-        let step = self.chunks * LANES;
-        self.hits.resize(self.lanes * returns, NO_HIT);
-        let ranges = self.range.as_flattened();
-        let intensities = self.intensity.as_flattened();
-        let (mut count, mut merged) = (0, 0);
-        for lane in 0..self.lanes {
-            let mut echoes = [RawEcho::default(); MOST];
-            for (echo, raw) in echoes.iter_mut().enumerate().take(returns) {
-                raw.range = ranges[echo * step + lane] as u16;
-                raw.intensity = intensities[echo * step + lane] as u8;
-            }
-            let (kinds, same) = judge(mode, &echoes[..returns]);
-            merged += u64::from(same);
-            for (echo, kind) in kinds.into_iter().enumerate().take(returns) {
-                let Some(return_kind) = kind else { continue };
-                self.hits[count] = Hit {
-                    entry: (echo * step + lane) as u16,
-                    lane: lane as u16,
-                    echo: echo as u8,
-                    return_kind,
-                };
-                count += 1;
-            }
+    /// Appends the returns of all firings that wait.
+    pub fn flush(&mut self, out: &mut Decoded) {
+        match self.single {
+            Some(kind) => self.sheet.flush_singles(kind, self.packets[0], out),
+            None => self.sheet.flush(self.packets, out),
         }
-        self.hits.truncate(count);
-        merged
+    }
+
+    fn hold(&mut self, fan: &Fan, near: Option<(&Fan, f64)>, row: &Row, out: &mut Decoded) {
+        self.packets = row.packets;
+        if !self.sheet.has_ranges() {
+            return self.sheet.remove_last();
+        }
+        self.place(fan, near, row);
+        if self.sheet.len() >= ENOUGH {
+            self.flush(out);
+        }
     }
 
     fn place(&mut self, fan: &Fan, near: Option<(&Fan, f64)>, row: &Row) {
-        place(fan, row, &self.range, &mut self.spots);
+        place(fan, row, &mut self.sheet);
         let Some((near_fan, near_m)) = near else {
             return;
         };
+        let (sheet, near) = (&mut self.sheet, &mut self.near);
+        let firing = sheet.firing();
         let is_near = |range: &i32| *range != 0 && f64::from(*range) * row.unit_m < near_m;
-        let ranges = self.range.as_flattened();
+        let ranges = &sheet.range[firing.clone()];
         if !ranges.iter().any(is_near) {
             return;
         }
-        place(near_fan, row, &self.range, &mut self.near);
-        let entries = ranges.iter().enumerate();
-        for (entry, _) in entries.filter(|(_, range)| is_near(range)) {
-            self.spots.copy(&self.near, entry);
+        near.open(firing.len(), 1);
+        near.range[..firing.len()].copy_from_slice(ranges);
+        place(near_fan, row, near);
+        for (from, at) in firing.enumerate() {
+            if is_near(&near.range[from]) {
+                sheet.azimuth_rad[at] = near.azimuth_rad[from];
+                sheet.xyz_m[at] = near.xyz_m[from];
+                sheet.time_ns[at] = near.time_ns[from];
+            }
         }
-    }
-
-    /// Appends a firing in which all shots hit.
-    fn keep_all(&self, fan: &Fan, row: &Row, return_kind: ReturnKind, out: &mut Decoded) {
-        let (spots, lanes) = (&self.spots, self.lanes);
-        fn all<T>(column: &[Lane<T>], lanes: usize) -> &[T] {
-            &column.as_flattened()[..lanes]
-        }
-        let cloud = &mut out.cloud;
-        out.encoder_rad
-            .extend_from_slice(all(&spots.encoder_rad, lanes));
-        cloud.xyz_m.extend_from_slice(all(&spots.xyz_m, lanes));
-        cloud.time_ns.extend_from_slice(all(&spots.time_ns, lanes));
-        cloud.range_m.extend_from_slice(all(&spots.range_m, lanes));
-        cloud
-            .azimuth_rad
-            .extend_from_slice(all(&spots.azimuth_rad, lanes));
-        cloud.ring.extend_from_slice(&fan.ring[..lanes]);
-        cloud
-            .intensity
-            .extend_from_slice(all(&self.intensity, lanes));
-        cloud.block.extend_from_slice(all(&self.block, lanes));
-        let len = cloud.xyz_m.len();
-        cloud.return_index.resize(len, 0);
-        cloud.return_kind.resize(len, return_kind);
-        cloud.packet.resize(len, row.packets[0]);
-    }
-
-    /// Appends the hits of a firing.
-    fn keep(&self, fan: &Fan, row: &Row, out: &mut Decoded) {
-        fn of<T: Copy>(column: &[Lane<T>], hits: &[Hit]) -> impl ExactSizeIterator<Item = T> {
-            let column = column.as_flattened();
-            hits.iter().map(|hit| column[usize::from(hit.entry)])
-        }
-        let (spots, hits) = (&self.spots, self.hits.as_slice());
-        let cloud = &mut out.cloud;
-        out.encoder_rad.extend(of(&spots.encoder_rad, hits));
-        cloud.xyz_m.extend(of(&spots.xyz_m, hits));
-        cloud.time_ns.extend(of(&spots.time_ns, hits));
-        cloud.range_m.extend(of(&spots.range_m, hits));
-        cloud.azimuth_rad.extend(of(&spots.azimuth_rad, hits));
-        cloud.intensity.extend(of(&self.intensity, hits));
-        cloud.block.extend(of(&self.block, hits));
-        let rings = hits.iter().map(|hit| fan.ring[usize::from(hit.lane)]);
-        cloud.ring.extend(rings);
-        cloud.return_index.extend(hits.iter().map(|hit| hit.echo));
-        let kinds = hits.iter().map(|hit| hit.return_kind);
-        cloud.return_kind.extend(kinds);
-        let packets = hits.iter().map(|hit| row.packets[usize::from(hit.echo)]);
-        cloud.packet.extend(packets);
     }
 }
 
@@ -288,6 +195,7 @@ mod tests {
         let (mut desk, mut out) = (Desk::default(), Decoded::default());
         dual(&mut desk);
         desk.push(&fan(20, 0), None, &ROW, ReturnMode::Dual, &mut out);
+        desk.flush(&mut out);
         let cloud = &out.cloud;
         assert_eq!((cloud.len(), out.merged), (1 + 2 * 18, 1));
         assert_eq!(
@@ -311,6 +219,7 @@ mod tests {
         let (far, near) = (fan(20, 0), fan(20, 500));
         dual(&mut desk);
         desk.push(&far, Some((&near, 30.0)), &ROW, ReturnMode::Dual, &mut out);
+        desk.flush(&mut out);
         assert_eq!(out.cloud.time_ns[..3], [1501, 1002, 1502]);
     }
 
@@ -324,6 +233,7 @@ mod tests {
                 *range = value;
             }
             desk.push(&fan(33, 0), None, &ROW, ReturnMode::Last, &mut out);
+            desk.flush(&mut out);
             out.cloud.iter().collect::<Vec<_>>()
         };
         let (full, gap) = (pushed(1), pushed(-5));

@@ -304,6 +304,7 @@ impl Decoder for At128Decoder {
             };
             firing.place(&view, &self.fan, None, &mut self.desk, out);
         }
+        self.desk.flush(out);
     }
 }
 

@@ -306,6 +306,7 @@ impl Decoder for AtxDecoder {
             };
             firing.place(&view, fan, None, &mut self.desk, out);
         }
+        self.desk.flush(out);
     }
 }
 

@@ -12,7 +12,10 @@ use super::layout::{Layout, MAGIC, NOWHERE, RawPacket, Tail, View, write};
 use super::rotating::ray;
 use super::unit::OBTAIN;
 use crate::error::UnitError;
-use crate::packet::fan::{Desk, Fan, Row, from_y, single_kind};
+use crate::packet::aim::{within_half_turn, wrapped};
+use crate::packet::fan::single_kind;
+use crate::packet::rays::Rays;
+use crate::packet::sheet::Sheet;
 use crate::packet::unit::{Calibration, Fitted, UnitFile};
 use crate::packet::{
     Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
@@ -205,10 +208,7 @@ impl Model for Ft120 {
         let grid = file.map_or_else(|| Ok(Grid::nominal()), Grid::read)?;
         let used: Vec<&UnitFile> = file.into_iter().collect();
         Ok(Fitted {
-            decoder: Box::new(Ft120Decoder {
-                fans: (0..COLUMNS).map(|column| grid.fan(column)).collect(),
-                desk: Desk::default(),
-            }),
+            decoder: Box::new(Ft120Decoder::new(&grid)),
             calibration: Calibration::of(&used, Calibration::Nominal { obtain: OBTAIN }),
         })
     }
@@ -261,48 +261,53 @@ impl Grid {
     }
 }
 
-impl Grid {
-    /// The beams of a column.
-    fn fan(&self, column: usize) -> Fan {
-        let pixels = self.0.iter().skip(column * ROWS).take(ROWS).enumerate();
-        let beam = |(row, (azimuth_rad, elevation_rad)): (usize, &(f64, f64))| {
-            ray(row, *azimuth_rad, elevation_rad.sin_cos(), 0.0)
-        };
-        pixels.map(beam).collect()
-    }
+struct Ft120Decoder {
+    /// Directions of the pixels, column by column, and their azimuths.
+    rays: Rays,
+    azimuth_rad: Vec<f32>,
+    sheet: Sheet,
 }
 
-struct Ft120Decoder {
-    /// By column.
-    fans: Vec<Fan>,
-    desk: Desk,
+impl Ft120Decoder {
+    fn new(grid: &Grid) -> Self {
+        let pixels = || grid.0.iter();
+        let beam = |(azimuth_rad, elevation_rad): &(f64, f64)| {
+            ray(0, *azimuth_rad, elevation_rad.sin_cos(), 0.0)
+        };
+        // x right, y forward, azimuth from y towards x.
+        let direction = |[ahead, aside, up]: [f64; 3]| [aside, ahead, up].map(|part| part + 0.0);
+        Self {
+            rays: pixels()
+                .map(|pixel| direction(beam(pixel).direction))
+                .collect(),
+            azimuth_rad: pixels()
+                .map(|pixel| wrapped(within_half_turn(pixel.0)))
+                .collect(),
+            sheet: Sheet::default(),
+        }
+    }
 }
 
 impl Decoder for Ft120Decoder {
     fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let packet = Packet::new(payload);
-        let known = packet.and_then(|packet| Some((self.fans.get(packet.column)?, packet)));
-        let Some((fan, packet)) = known else {
+        let Some(packet) = Packet::new(payload) else {
             return out.drops.add("packet_size", 1);
         };
-        self.desk.open(fan.len(), 1);
-        let echoes = self.desk.echoes(0);
-        echoes.block.fill(packet.column as u16);
-        let (ranges, intensities) = (&mut echoes.range[packet.first..], echoes.intensity);
-        packet
-            .view
-            .read(0, 1, ranges, &mut intensities[packet.first..]);
-        let row = Row {
-            encoder_rad: packet.azimuth_rad(),
-            azimuth_rad: 0.0,
-            axes: from_y((0.0, 1.0)),
-            origin_m: [0.0; 3],
-            unit_m: packet.view.layout().unit_m,
-            time_ns: place.time.0,
-            packets: [place.packet; 3],
-        };
-        let return_kind = single_kind(packet.view.return_mode());
-        self.desk.push_single(fan, None, &row, return_kind, out);
+        let (view, sheet) = (&packet.view, &mut self.sheet);
+        let (shots, unit_m) = (view.layout().channels, view.layout().unit_m);
+        sheet.open(shots, 1);
+        view.read(0, 1, &mut sheet.range[..shots], &mut sheet.intensity);
+        let first = packet.column * ROWS + packet.first;
+        self.rays.place(first, unit_m, 0..shots, sheet);
+        let azimuths = &self.azimuth_rad[first..first + shots];
+        sheet.azimuth_rad[..shots].copy_from_slice(azimuths);
+        sheet.encoder_rad[..shots].fill(wrapped(packet.azimuth_rad()));
+        sheet.time_ns[..shots].fill(place.time.0);
+        sheet.block[..shots].fill(packet.column as u16);
+        let rings = (packet.first as u16..).zip(&mut sheet.ring[..shots]);
+        rings.for_each(|(number, ring)| *ring = number);
+        let kind = single_kind(view.return_mode());
+        sheet.flush_singles(kind, place.packet, out);
     }
 }
 

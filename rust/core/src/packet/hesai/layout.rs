@@ -225,6 +225,7 @@ pub struct View<'a> {
 
 impl<'a> View<'a> {
     /// `None` where the payload is not as long as the layout says, or nothing is in it.
+    #[inline]
     pub fn new(payload: &'a [u8], layout: Layout) -> Option<Self> {
         let is_full = layout.blocks > 0 && layout.channels > 0;
         let blocks = layout.body + layout.blocks * layout.block_len;
@@ -233,6 +234,7 @@ impl<'a> View<'a> {
     }
 
     /// Its layout.
+    #[inline]
     pub fn layout(&self) -> &Layout {
         &self.layout
     }
@@ -242,12 +244,18 @@ impl<'a> View<'a> {
         Header::new(self.payload)
     }
 
+    #[inline]
     fn block(&self, block: usize) -> &'a [u8] {
-        let start = self.layout.body + block % self.layout.blocks * self.layout.block_len;
+        let block = match block < self.layout.blocks {
+            true => block,
+            false => block % self.layout.blocks,
+        };
+        let start = self.layout.body + block * self.layout.block_len;
         &self.payload[start..start + self.layout.block_len]
     }
 
     /// Azimuth of a block, in the model's unit.
+    #[inline]
     pub fn azimuth(&self, block: usize) -> u16 {
         u16_at(self.block(block), self.layout.azimuth)
     }
@@ -268,6 +276,7 @@ impl<'a> View<'a> {
     }
 
     /// Reads ranges and brightnesses of a block by channel; ranges below the least are no echo.
+    #[inline]
     pub fn read(&self, block: usize, least: u16, ranges: &mut [i32], intensities: &mut [u16]) {
         let bytes = &self.block(block)[self.layout.echoes..];
         let length = self.layout.channels * self.layout.echo_len;
@@ -279,16 +288,19 @@ impl<'a> View<'a> {
         }
     }
 
+    #[inline]
     fn tail(&self) -> &'a [u8] {
         &self.payload[self.layout.tail..]
     }
 
     /// A byte of the tail; 0 where the tail ends before.
+    #[inline]
     pub fn tail_byte(&self, place: usize) -> u8 {
         self.tail().get(place).copied().unwrap_or(0)
     }
 
     /// Mode of operation; 0 where the tail has none.
+    #[inline]
     pub fn operation(&self) -> u8 {
         self.layout
             .fields
@@ -297,6 +309,7 @@ impl<'a> View<'a> {
     }
 
     /// State of the firing of a block, 0 to 3.
+    #[inline]
     pub fn azimuth_state(&self, block: usize) -> u8 {
         let Some(place) = self.layout.fields.azimuth_state else {
             return 0;
@@ -306,11 +319,13 @@ impl<'a> View<'a> {
     }
 
     /// Which returns it carries.
+    #[inline]
     pub fn return_mode(&self) -> ReturnMode {
         modes::mode(self.tail_byte(self.layout.fields.return_mode))
     }
 
     /// Turns a minute; negative against the usual sense.
+    #[inline]
     pub fn rpm(&self) -> f64 {
         let raw = u16_at(self.tail(), self.layout.fields.speed) as i16;
         f64::from(raw) * self.layout.fields.speed_rpm
@@ -363,6 +378,7 @@ fn read<'a, E: AsRef<[u8]> + ?Sized + 'a>(
     }
 }
 
+#[inline]
 fn u16_at(bytes: &[u8], place: usize) -> u16 {
     let pair = bytes
         .get(place..place + 2)

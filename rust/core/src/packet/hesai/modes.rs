@@ -17,10 +17,21 @@ const MODES: [(u8, ReturnMode); 11] = [
     (0x35, ReturnMode::Strongest),
 ];
 
+static BY_BYTE: [ReturnMode; 256] = {
+    let mut modes = [ReturnMode::Strongest; 256];
+    let mut place = 0;
+    while place < MODES.len() {
+        let (byte, mode) = MODES[place];
+        modes[byte as usize] = mode;
+        place += 1;
+    }
+    modes
+};
+
 /// The mode of a byte. The header of some models counts returns wrongly; this byte does not.
+#[inline]
 pub fn mode(byte: u8) -> ReturnMode {
-    let known = MODES.iter().find(|(value, _)| *value == byte);
-    known.map_or(ReturnMode::Strongest, |(_, mode)| *mode)
+    BY_BYTE[usize::from(byte)]
 }
 
 /// The byte of a mode.

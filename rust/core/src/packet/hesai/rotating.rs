@@ -6,21 +6,20 @@
 
 mod decoder;
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 use std::fmt::Debug;
 
 use super::channels::Channels;
 use super::layout::{Layout, RawPacket, View, write};
 use super::unit::{self, Kind, Unit};
 use crate::error::UnitError;
+use crate::packet::aim::RAD_PER_CENTIDEG;
 use crate::packet::echoes::{MOST, RawEcho, judge};
 use crate::packet::unit::{Fitted, UnitFile};
 use crate::packet::{Counting, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 use decoder::RotatingDecoder;
 pub use decoder::{Firing, ray};
-
-const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 
 /// What the models with blocks differ in.
 pub trait Family: Send + Sync + Debug + Copy + 'static {

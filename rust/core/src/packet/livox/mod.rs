@@ -7,6 +7,8 @@
 //! Sources: the maker's communication protocols and drivers.
 
 pub mod account;
+mod decoder;
+mod lanes;
 pub mod points;
 pub mod sdk1;
 pub mod sdk2;

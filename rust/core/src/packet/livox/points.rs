@@ -1,7 +1,5 @@
 //! Points as the packets of both protocols carry them: Cartesian or spherical, one, two or three of a shot.
 
-use crate::packet::aim::Centidegrees;
-
 /// How the place of a point is told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coordinates {
@@ -38,17 +36,6 @@ pub struct RawPoint {
     pub reflectivity: u8,
     /// How much it is to be believed.
     pub tag: u8,
-}
-
-/// A point in the sensor frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Spot {
-    /// Position, metres.
-    pub xyz_m: [f32; 3],
-    /// Range, metres; 0 where it follows from the position.
-    pub range_m: f32,
-    /// From forward to the left, [0, 2 pi); 0 where it follows from the position.
-    pub azimuth_rad: f32,
 }
 
 impl Form {
@@ -177,34 +164,6 @@ impl Form {
             _ => point.numbers.iter().map(|n| size(n) * size(n)).sum(),
         }
     }
-
-    /// Where a point is.
-    #[inline]
-    pub fn place(&self, point: &RawPoint, table: Centidegrees) -> Spot {
-        let unit_m = match self.coordinates {
-            Coordinates::Narrow => 0.01,
-            _ => 0.001,
-        };
-        if self.coordinates == Coordinates::Spherical {
-            let [range, zenith, azimuth] = point.numbers;
-            let range_m = f64::from(range) * unit_m;
-            let (level, up) = table.sin_cos(zenith);
-            let (left, forward) = table.sin_cos(azimuth);
-            let level_m = range_m * level;
-            return Spot {
-                xyz_m: [level_m * forward, level_m * left, range_m * up].map(|m| m as f32),
-                range_m: range_m as f32,
-                azimuth_rad: table.wrapped(azimuth),
-            };
-        }
-        Spot {
-            xyz_m: point
-                .numbers
-                .map(|number| (f64::from(number) * unit_m) as f32),
-            range_m: 0.0,
-            azimuth_rad: 0.0,
-        }
-    }
 }
 
 #[inline]
@@ -260,10 +219,6 @@ mod tests {
             tag: 5,
         };
         assert_eq!(point, expected);
-        // 10 m level, straight behind.
-        let spot = form.place(&point, Centidegrees::table());
-        let [x, y, z] = spot.xyz_m;
-        assert!((x + 10.0).abs() < 1e-6 && y.abs() < 1e-6 && z.abs() < 1e-6);
         // The second of two: angles first, then range, brightness and tag of each.
         let pair = [
             0x28, 0x23, 0, 0, 1, 0, 0, 0, 2, 3, 0xE8, 3, 0, 0, 0x50, 0x10,
@@ -271,19 +226,5 @@ mod tests {
         let second = Form::new(Coordinates::Spherical, 2, true).read(&pair, 1);
         assert_eq!(second.numbers, [1000, 9_000, 0]);
         assert_eq!((second.reflectivity, second.tag), (0x50, 0x10));
-    }
-
-    #[test]
-    fn centimetres_and_millimetres_are_told_apart() {
-        let point = RawPoint {
-            numbers: [300, -400, 1200],
-            reflectivity: 1,
-            tag: 0,
-        };
-        for (coordinates, unit_m) in [(Coordinates::Narrow, 0.01), (Coordinates::Wide, 0.001)] {
-            let spot = Form::new(coordinates, 1, true).place(&point, Centidegrees::table());
-            let expected = [300.0, -400.0, 1200.0].map(|number| (number * unit_m) as f32);
-            assert_eq!(spot.xyz_m, expected);
-        }
     }
 }

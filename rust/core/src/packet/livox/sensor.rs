@@ -5,20 +5,15 @@
 //! protocol the time between points tells Mid-360 and HAP.
 
 use super::account::{self, Account};
-use super::points::{Coordinates, RawPoint};
+use super::decoder::{LivoxDecoder, meanings};
 use super::shots::{Packet, Step};
 use super::{sdk1, sdk2};
-use crate::cloud::{Return, ReturnKind};
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
-use crate::packet::aim::{Centidegrees, bear, reach, wrapped};
-use crate::packet::batch::Batch;
-use crate::packet::echoes::{self, Meanings, RawEcho, judge};
+use crate::packet::echoes;
 use crate::packet::frames::{RAD_PER_NS, phase_rad};
 use crate::packet::unit::{Calibration, Fitted, Gather, UnitFacts, UnitFile};
-use crate::packet::{
-    Counting, Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally,
-};
+use crate::packet::{Counting, Head, Misfit, Model, PacketKind, ReturnMode, Tally};
 
 /// Which development kit speaks the protocol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +47,8 @@ pub struct Livox {
     /// Whether its packets can be told at all, be it together with candidates.
     is_told: bool,
     step: Step,
-    lines: u16,
+    /// Lasers that fire one after the other.
+    pub(super) lines: u16,
     /// Whether its packets number the frames.
     counts_frames: bool,
 }
@@ -170,41 +166,6 @@ impl Livox {
     }
 }
 
-/// Meaning of the points of a shot, by their ranges, and how many repeat another.
-fn meanings(packet: &Packet<'_>, points: &[RawPoint]) -> (Meanings, u32) {
-    let mut orders = [0; echoes::MOST];
-    for (order, point) in orders.iter_mut().zip(points) {
-        *order = packet.form.order(point);
-    }
-    let orders = &orders[..points.len().min(echoes::MOST)];
-    // Places by range stand for the ranges, which have more bits; no range is no return.
-    let mut ranks = [RawEcho::default(); echoes::MOST];
-    for ((rank, point), order) in ranks.iter_mut().zip(points).zip(orders) {
-        let nearer = orders.iter().filter(|other| *other < order).count() as u16;
-        rank.range = if *order == 0 { 0 } else { 1 + nearer };
-        rank.intensity = point.reflectivity;
-    }
-    let (mut kinds, merged) = judge(packet.return_mode(), &ranks[..orders.len()]);
-    if kinds.iter().flatten().count() == echoes::MOST {
-        for kind in kinds.iter_mut().flatten() {
-            // Between the first and the last of three is the second.
-            if *kind == ReturnKind::Strongest {
-                *kind = ReturnKind::Second;
-            }
-        }
-    }
-    (kinds, merged)
-}
-
-fn points(packet: &Packet<'_>, shot: &[u8]) -> ([RawPoint; echoes::MOST], usize) {
-    let echoes = packet.form.echoes.min(echoes::MOST);
-    let mut points = [RawPoint::default(); echoes::MOST];
-    for (echo, point) in points.iter_mut().enumerate().take(echoes) {
-        *point = packet.form.read(shot, echo);
-    }
-    (points, echoes)
-}
-
 impl Model for Livox {
     fn id(&self) -> &'static str {
         self.id
@@ -283,15 +244,16 @@ impl Model for Livox {
         let Some(packet) = self.read(payload) else {
             return tally;
         };
+        let echoes = packet.form.echoes.min(echoes::MOST);
+        let order = |shot, echo| packet.form.order(&packet.form.read(shot, echo));
         for shot in packet.shots() {
-            let (points, echoes) = points(&packet, shot);
-            if echoes == 1 {
-                tally.points += u32::from(!packet.form.is_none(&points[0]));
-            } else {
-                let (kinds, merged) = meanings(&packet, &points[..echoes]);
-                tally.points += kinds.iter().flatten().count() as u32;
-                tally.merged += merged;
+            let mut orders = [0; echoes::MOST];
+            for (echo, place) in orders.iter_mut().enumerate().take(echoes) {
+                *place = order(shot, echo);
             }
+            let (kinds, merged) = meanings(packet.return_mode(), &orders[..echoes]);
+            tally.points += kinds.iter().flatten().count() as u32;
+            tally.merged += merged;
         }
         tally
     }
@@ -344,11 +306,7 @@ impl Model for Livox {
 
     fn fit(&self, _files: &[UnitFile]) -> Result<Fitted, UnitError> {
         Ok(Fitted {
-            decoder: Box::new(LivoxDecoder {
-                model: *self,
-                table: Centidegrees::table(),
-                batch: Batch::default(),
-            }),
+            decoder: Box::new(LivoxDecoder::new(*self)),
             calibration: Calibration::Factory,
         })
     }
@@ -358,127 +316,5 @@ impl Livox {
     fn shots_of_single(&self) -> usize {
         let kind = self.types.first().copied().unwrap_or_default();
         sdk1::form(kind).map_or(1, |(shots, _)| shots)
-    }
-}
-
-struct LivoxDecoder {
-    model: Livox,
-    table: Centidegrees,
-    batch: Batch,
-}
-
-/// One packet on its way.
-struct Work<'a> {
-    packet: Packet<'a>,
-    place: Place,
-    phase_rad: f64,
-    lines: u16,
-    table: Centidegrees,
-}
-
-/// Number, time and line of a shot.
-#[derive(Clone, Copy)]
-struct Shot {
-    number: u16,
-    since_ns: i64,
-    line: u16,
-}
-
-impl<'a> Work<'a> {
-    /// The shots of the packet.
-    fn shots(&self) -> impl Iterator<Item = (Shot, &'a [u8])> + use<'a> {
-        let lines = (0..self.lines).cycle();
-        let times = self.packet.step.times().zip(lines);
-        let shots = (0..=u16::MAX).zip(times).zip(self.packet.shots());
-        shots.map(|((number, (since_ns, line)), bytes)| {
-            let shot = Shot {
-                number,
-                since_ns,
-                line,
-            };
-            (shot, bytes)
-        })
-    }
-
-    #[inline]
-    fn push(&self, shot: Shot, echo: usize, point: &RawPoint, kind: ReturnKind, out: &mut Batch) {
-        let spot = self.packet.form.place(point, self.table);
-        let encoder_rad = self.phase_rad + shot.since_ns as f64 * RAD_PER_NS;
-        let echo = Return {
-            xyz_m: spot.xyz_m,
-            time: self.place.time + shot.since_ns,
-            range_m: spot.range_m,
-            azimuth_rad: spot.azimuth_rad,
-            ring: shot.line,
-            intensity: point.reflectivity.into(),
-            return_index: echo as u8,
-            return_kind: kind,
-            packet: self.place.packet,
-            block: shot.number,
-        };
-        out.push(echo, wrapped(encoder_rad));
-    }
-
-    /// Shots of one return each.
-    fn single(&self, out: &mut Batch) {
-        for (shot, bytes) in self.shots() {
-            let point = self.packet.form.read(bytes, 0);
-            if !self.packet.form.is_none(&point) {
-                self.push(shot, 0, &point, ReturnKind::Strongest, out);
-            }
-        }
-    }
-
-    /// Shots of several returns each; how many echoes were reported twice.
-    fn several(&self, out: &mut Batch) -> u64 {
-        let mut twice = 0;
-        for (shot, bytes) in self.shots() {
-            let (points, echoes) = points(&self.packet, bytes);
-            let (kinds, merged) = meanings(&self.packet, &points[..echoes]);
-            twice += u64::from(merged);
-            for (echo, (point, kind)) in points.iter().zip(kinds).enumerate() {
-                if let Some(kind) = kind {
-                    self.push(shot, echo, point, kind, out);
-                }
-            }
-        }
-        twice
-    }
-}
-
-impl Decoder for LivoxDecoder {
-    fn decode(&mut self, payload: &[u8], place: Place, out: &mut Decoded) {
-        let Some(packet) = self.model.read(payload) else {
-            return out.drops.add("packet_size", 1);
-        };
-        let work = |coordinates| Work {
-            packet: Packet {
-                form: super::points::Form {
-                    coordinates,
-                    ..packet.form
-                },
-                ..packet
-            },
-            place,
-            phase_rad: phase_rad(packet.device_ns),
-            lines: self.model.lines,
-            table: self.table,
-        };
-        let (first, batch) = (out.cloud.len(), &mut self.batch);
-        // One loop for each kind of coordinates.
-        match packet.form.coordinates {
-            coordinates if packet.form.echoes > 1 => {
-                out.merged += work(coordinates).several(batch);
-            }
-            Coordinates::Wide => work(Coordinates::Wide).single(batch),
-            Coordinates::Narrow => work(Coordinates::Narrow).single(batch),
-            Coordinates::Spherical => work(Coordinates::Spherical).single(batch),
-        }
-        batch.flush(out);
-        if packet.form.coordinates != Coordinates::Spherical {
-            let cloud = &mut out.cloud;
-            bear(&cloud.xyz_m[first..], &mut cloud.azimuth_rad[first..]);
-            reach(&cloud.xyz_m[first..], &mut cloud.range_m[first..]);
-        }
     }
 }

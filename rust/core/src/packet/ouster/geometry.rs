@@ -110,6 +110,7 @@ mod tests {
         desk.echoes(0).range[0] = 10_000;
         let kind = ReturnKind::Strongest;
         desk.push_single(&geometry.fan(), None, &row, kind, &mut out);
+        desk.flush(&mut out);
         let [x, y, z] = out.cloud.xyz_m[0];
         let azimuth_rad = f64::from(out.cloud.azimuth_rad[0]);
         // A quarter turn clockwise: the encoder looks along -y of the lidar, which is +y of the sensor.

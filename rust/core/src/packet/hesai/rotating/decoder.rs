@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Family, firings};
+use crate::packet::aim::told;
 use crate::packet::fan::{Beam, Desk, Fan, Row, from_y};
 use crate::packet::hesai::channels::Channels;
 use crate::packet::hesai::layout::View;
@@ -169,7 +170,7 @@ impl Firing {
         let row = Row {
             encoder_rad: self.encoder_rad,
             azimuth_rad: self.azimuth_rad,
-            axes: from_y(self.azimuth_rad.sin_cos()),
+            axes: from_y(told(self.azimuth_rad)),
             origin_m: [0.0; 3],
             unit_m: view.layout().unit_m,
             time_ns: self.time.0,
@@ -191,5 +192,6 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
         for first in firings(&view) {
             self.firing(&view, first, place, out);
         }
+        self.desk.flush(out);
     }
 }

@@ -47,12 +47,27 @@ pub struct Record {
 }
 
 impl Record {
+    /// Reads it; `None` for a marker.
+    #[inline(always)]
+    pub fn read(bytes: &[u8]) -> Option<Self> {
+        let echo = |at: usize| {
+            let bytes = bytes.get(at..at + 4).unwrap_or(&[0; 4]);
+            (big(&bytes[..3]), bytes[3])
+        };
+        (!bytes.starts_with(&MARKER)).then(|| Self {
+            line: bytes[0],
+            azimuth: big(&bytes[1..3]) as u16,
+            echoes: [echo(3), echo(7)],
+        })
+    }
+
     /// Whether there is an echo.
     pub fn is_seen(&self) -> bool {
         self.echoes.iter().any(|(range, _)| *range != 0)
     }
 }
 
+#[inline(always)]
 fn big(bytes: &[u8]) -> u32 {
     bytes
         .iter()
@@ -83,29 +98,21 @@ impl<'a> View<'a> {
         self.mode
     }
 
-    /// Records with their numbers; markers are left out.
-    pub fn numbered(&self) -> impl Iterator<Item = (usize, Record)> + use<'a> {
+    /// Records; `None` for a marker.
+    fn slots(&self) -> impl Iterator<Item = Option<Record>> + use<'a> {
         let places = self.bytes.chunks_exact(record_len(self.mode));
-        let records = places.take(count(self.mode)).enumerate();
-        records
-            .filter(|(_, bytes)| !bytes.starts_with(&MARKER))
-            .map(|(number, bytes)| {
-                let echo = |at: usize| {
-                    let bytes = bytes.get(at..at + 4).unwrap_or(&[0; 4]);
-                    (big(&bytes[..3]), bytes[3])
-                };
-                let record = Record {
-                    line: bytes[0],
-                    azimuth: big(&bytes[1..3]) as u16,
-                    echoes: [echo(3), echo(7)],
-                };
-                (number, record)
-            })
+        places.take(count(self.mode)).map(Record::read)
+    }
+
+    /// Bytes of the records, where they have this length.
+    pub fn bytes<const LEN: usize>(&self) -> &'a [[u8; LEN]] {
+        let records = self.bytes.as_chunks().0;
+        &records[..count(self.mode).min(records.len())]
     }
 
     /// Records; markers are left out.
     pub fn records(&self) -> impl Iterator<Item = Record> + use<'a> {
-        self.numbered().map(|(_, record)| record)
+        self.slots().flatten()
     }
 
     /// Second of the minute of a short packet.

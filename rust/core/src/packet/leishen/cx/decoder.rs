@@ -1,16 +1,14 @@
 //! From packets of the C series to returns: x right, y forward, azimuth 0 along y.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use super::{Cx, is_usable};
-use crate::packet::aim::{add, small_turn};
+use crate::packet::aim::{RAD_PER_CENTIDEG, add, small_turn, told};
 use crate::packet::fan::{Beam, Desk, Fan, Known, Row, from_y};
 use crate::packet::leishen::difop::Difop;
 use crate::packet::leishen::products::Product;
 use crate::packet::velodyne::{BLOCKS, CHANNELS, Packet};
 use crate::packet::{Decoded, Decoder, Place};
-
-const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 
 /// Channels of a C32W whose beams lie aside, and by how much.
 const ASIDE: [usize; 8] = [6, 7, 14, 15, 22, 23, 29, 30];
@@ -215,7 +213,7 @@ impl Decoder for CxDecoder {
             let row = Row {
                 encoder_rad: azimuth_rad,
                 azimuth_rad,
-                axes: from_y(azimuth_rad.sin_cos()),
+                axes: from_y(told(azimuth_rad)),
                 origin_m: [0.0; 3],
                 unit_m: self.cx.product.unit_m,
                 time_ns: place.time.0.saturating_add(rotation.start_ns(row)),
@@ -223,5 +221,6 @@ impl Decoder for CxDecoder {
             };
             self.desk.push(fan, None, &row, mode, out);
         }
+        self.desk.flush(out);
     }
 }

@@ -122,5 +122,6 @@ impl Decoder for UnitDecoder {
             self.read(&column);
             self.push(&row, out);
         }
+        self.desk.flush(out);
     }
 }

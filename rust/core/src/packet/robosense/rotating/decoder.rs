@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::turn::Turn;
 use super::{Family, GUARD_M, Lens, Settings, Slot};
-use crate::packet::aim::{add, small_turn};
+use crate::packet::aim::{add, small_turn, told};
 use crate::packet::fan::{Beam, Desk, Known, Row, from_x};
 use crate::packet::robosense::difop::Angles;
 use crate::packet::robosense::layout::View;
@@ -225,13 +225,16 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
                     .map(|shot| shot.map_or(Beam::default(), aimed))
                     .collect()
             });
+            let next = shared.filter(|_| firing + 1 == turn.firings());
+            if next.is_some() {
+                self.desk.flush(out);
+            }
             self.desk.open(fan.len(), returns);
             let mut held = 0;
             for block in turn.blocks_of(firing) {
                 wiring.fill(&view, block, &kept, &mut self.desk);
                 held += 1;
             }
-            let next = shared.filter(|_| firing + 1 == turn.firings());
             if let Some((next, _)) = &next {
                 wiring.fill(next, (0, held), &kept, &mut self.desk);
             }
@@ -240,7 +243,7 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             let row = Row {
                 encoder_rad,
                 azimuth_rad: encoder_rad,
-                axes: from_x(encoder_rad.sin_cos()),
+                axes: from_x(told(encoder_rad)),
                 origin_m: [0.0; 3],
                 unit_m,
                 time_ns: (place.time + turn.start_ns(firing)).0,
@@ -248,5 +251,6 @@ impl<F: Family> Decoder for RotatingDecoder<F> {
             };
             self.desk.push(fan, None, &row, mode, out);
         }
+        self.desk.flush(out);
     }
 }

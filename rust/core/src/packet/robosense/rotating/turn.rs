@@ -1,12 +1,12 @@
 //! How the rotor turns within one packet: firings, their azimuths and times, and a gap of the view.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 use super::Family;
 use crate::packet::LeftOut;
+use crate::packet::aim::RAD_PER_CENTIDEG;
 use crate::packet::robosense::layout::View;
 
-const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 /// No packet has more blocks.
 const MOST: usize = 16;
 /// A step this many times the usual one, and by more than a degree, is a gap of the field of view.

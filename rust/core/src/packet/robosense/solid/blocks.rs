@@ -3,6 +3,8 @@
 //! Where the maker's driver reads the forward part of a direction of the MX without sign, it is read with
 //! sign here, as in all other models.
 
+use std::ops::Range;
+
 use super::header::{self, RawHeader, u8_at, u16_at};
 use crate::packet::aim::Centidegrees;
 
@@ -83,6 +85,12 @@ impl Blocks {
         self.time_len + usize::from(self.has_return)
     }
 
+    /// Where a block has its points.
+    pub fn body(&self) -> Range<usize> {
+        let start = self.first_point();
+        start..start + self.points * self.point_len
+    }
+
     /// Writes a packet: of each block the time in microseconds, the number of the return and its points.
     pub fn encode(
         &self,
@@ -149,21 +157,21 @@ impl<'a> Block<'a> {
 
     /// Its points.
     pub fn points(&self) -> std::slice::ChunksExact<'a, u8> {
-        let start = self.layout.first_point();
-        let end = start + self.layout.points * self.layout.point_len;
-        let bytes = self.bytes.get(start..end).unwrap_or(&[]);
+        let bytes = self.bytes.get(self.layout.body()).unwrap_or(&[]);
         bytes.chunks_exact(self.layout.point_len)
+    }
+
+    /// The same where they have a length that the compiler knows; `body` is [`Blocks::body`].
+    #[inline(always)]
+    pub fn points_of<const LEN: usize>(&self, body: &Range<usize>) -> &'a [[u8; LEN]] {
+        let bytes = self.bytes.get(body.clone()).unwrap_or(&[]);
+        bytes.as_chunks().0
     }
 }
 
 impl Point {
-    /// Range of the first return.
-    #[inline]
-    pub fn range(self, point: &[u8]) -> u16 {
-        u16_at(point, 0)
-    }
-
     /// Ranges and brightnesses.
+    #[inline(always)]
     pub fn echoes(self, point: &[u8]) -> [(u16, u8); 2] {
         match self {
             Self::Angles => [(u16_at(point, 0), u8_at(point, 6)), (0, 0)],
@@ -176,7 +184,7 @@ impl Point {
     }
 
     /// Where it is seen.
-    #[inline]
+    #[inline(always)]
     pub fn aim(self, point: &[u8], table: Centidegrees) -> Aim {
         if self == Self::Angles {
             let angle = |at: usize| i32::from(u16_at(point, at)) - ANGLE_ZERO;

@@ -4,9 +4,8 @@
 //! reserved. EM4: as the manual has it, packets of fixed length. The offsets of zones of 20 rows are taken
 //! for single bytes, of which there are as many as zones; the manual's example has two bytes for each.
 
-use super::description::Angles;
 use super::header::{self, RawHeader, u8_at, u16_at};
-use crate::packet::aim::{add, turn};
+use crate::packet::aim::{add, small_turn};
 
 /// Byte ranges of the header beside those of all models.
 mod field {
@@ -21,7 +20,7 @@ mod field {
 }
 
 /// Bytes of a point: range, brightness, attribute.
-const POINT_LEN: usize = 4;
+pub const POINT_LEN: usize = 4;
 
 /// The two models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,13 +31,17 @@ pub enum Columns {
     Em4,
 }
 
-/// Place of a point in its column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Slot {
-    /// Row.
-    pub row: usize,
-    /// Which return, 0 or 1.
-    pub echo: usize,
+/// Angles of a row of a unit.
+#[derive(Debug, Clone, Copy)]
+pub struct RowAngles {
+    /// Sine and cosine of its pitch.
+    pub pitch: (f64, f64),
+    /// What its zone adds to the yaw.
+    pub offset_rad: f64,
+    /// Sine and cosine of that.
+    pub offset: (f64, f64),
+    /// Whether its zone fires after those of odd number.
+    pub is_late: bool,
 }
 
 impl Columns {
@@ -105,22 +108,25 @@ impl Columns {
         }
     }
 
-    /// Row and return of each point of a packet in order.
-    pub fn slots(self, payload: &[u8], returns: usize) -> impl Iterator<Item = Slot> {
+    /// First row of a packet.
+    pub fn first_row(self, payload: &[u8], returns: usize) -> usize {
         let parts = self.rows() * returns / self.count();
         let number = header::number(payload).wrapping_sub(1) as usize;
-        let first = number % parts * (self.count() / returns);
-        (0..self.count()).map(move |place| Slot {
-            row: first + place / returns,
-            echo: place % returns,
-        })
+        number % parts * (self.count() / returns)
+    }
+
+    /// Points of a packet.
+    pub fn points(self, payload: &[u8]) -> &[[u8; POINT_LEN]] {
+        let body = payload.get(header::LEN..).unwrap_or(&[]);
+        let points = body.as_chunks().0;
+        &points[..self.count().min(points.len())]
     }
 
     /// Range and brightness of a point.
     #[inline]
-    pub fn echo(self, payload: &[u8], place: usize) -> (u16, u8) {
-        let start = header::LEN + POINT_LEN * place;
-        (u16_at(payload, start), u8_at(payload, start + 2))
+    pub fn echo(self, point: &[u8; POINT_LEN]) -> (u16, u8) {
+        let [high, low, intensity, _] = *point;
+        (u16::from_be_bytes([high, low]), intensity)
     }
 
     /// Time by which the zones of odd number fire before the others.
@@ -128,16 +134,6 @@ impl Columns {
         match self {
             Self::Emx => 0,
             Self::Em4 => (256 + i64::from(u8_at(payload, field::INTERVAL) as i8)) * 1000,
-        }
-    }
-
-    /// Time of a row after the packet's first shot.
-    pub fn since_ns(self, row: usize, lead_ns: i64) -> i64 {
-        // Zones are counted from 1.
-        if (row / self.zone_rows()).is_multiple_of(2) {
-            0
-        } else {
-            lead_ns
         }
     }
 
@@ -149,7 +145,7 @@ impl Columns {
         }
     }
 
-    fn pitch_offset_rad(self, payload: &[u8], angles: &Angles) -> f64 {
+    fn pitch_offset_rad(self, payload: &[u8], surface_rad: &[f64]) -> f64 {
         match self {
             Self::Emx => {
                 let raw = f64::from(u16_at(payload, field::PITCH_OFFSET) as i16);
@@ -157,18 +153,18 @@ impl Columns {
             }
             Self::Em4 => {
                 let surface = usize::from(u8_at(payload, field::SURFACE)).wrapping_sub(1);
-                angles.surface_rad.get(surface).copied().unwrap_or(0.0)
+                surface_rad.get(surface).copied().unwrap_or(0.0)
             }
         }
     }
 
-    /// Where the rows of a packet point.
-    pub fn aims(self, payload: &[u8], angles: &Angles) -> ColumnAim {
+    /// Where the rows of a packet point, with what the surfaces of the mirror add to their pitch.
+    pub fn aims(self, payload: &[u8], surface_rad: &[f64]) -> ColumnAim {
         let yaw_rad = self.yaw_deg(payload).to_radians();
         ColumnAim {
             yaw_rad,
             yaw: yaw_rad.sin_cos(),
-            pitch_offset_rad: self.pitch_offset_rad(payload, angles),
+            pitch_offset: small_turn(self.pitch_offset_rad(payload, surface_rad)),
         }
     }
 
@@ -199,20 +195,18 @@ impl Columns {
 pub struct ColumnAim {
     yaw_rad: f64,
     yaw: (f64, f64),
-    pitch_offset_rad: f64,
+    pitch_offset: (f64, f64),
 }
 
 impl ColumnAim {
     /// Direction of a row of one metre: forward, left, up; and its yaw.
-    #[inline]
-    pub fn row(&self, row: usize, zone: usize, angles: &Angles) -> ([f64; 3], f64) {
-        let pitch = angles.pitch.get(row).copied().unwrap_or((0.0, 1.0));
-        let (up, level) = turn(pitch, self.pitch_offset_rad);
-        let (offset_rad, offset) = angles.zone(zone);
-        let (left, forward) = add(self.yaw, offset);
+    #[inline(always)]
+    pub fn row(&self, row: &RowAngles) -> ([f64; 3], f64) {
+        let (up, level) = add(row.pitch, self.pitch_offset);
+        let (left, forward) = add(self.yaw, row.offset);
         (
             [level * forward, level * left, up],
-            self.yaw_rad + offset_rad,
+            self.yaw_rad + row.offset_rad,
         )
     }
 }
@@ -236,6 +230,7 @@ pub struct RawColumn {
 
 #[cfg(test)]
 mod tests {
+    use super::super::description::Angles;
     use super::*;
     use crate::packet::ReturnMode;
 
@@ -259,11 +254,15 @@ mod tests {
         // Yaw 54.56 degrees, zone offset -0.03, pitch -15.46, surface A +0.15; 263.197 m.
         let mut pitches = vec![0; 520];
         pitches[21] = -1546;
-        let bytes = super::super::description::encode_em4(&pitches, &[0, -3], &[15, 0, 0, 0]);
+        let bytes = crate::packet::robosense::solid::description::encode_em4(
+            &pitches,
+            &[0, -3],
+            &[15, 0, 0, 0],
+        );
         let angles = Angles::of_em4(&bytes).unwrap();
         let payload = Columns::Em4.encode(0x70, &column(1, 5456, 1));
-        let aim = Columns::Em4.aims(&payload, &angles);
-        let (direction, yaw_rad) = aim.row(21, 1, &angles);
+        let aim = Columns::Em4.aims(&payload, &angles.surface_rad);
+        let (direction, yaw_rad) = aim.row(&angles.row(Columns::Em4, 21));
         // The manual rounds to 147.31, 206.75 and -69.49; its z for y and the pitch it states is -69.50.
         for (part, metres) in direction.iter().zip([147.31, 206.75, -69.49]) {
             assert!((part * 263.197 - metres).abs() < 0.03, "{direction:?}");
@@ -272,22 +271,20 @@ mod tests {
         // 256 us - 67 us before the even zones.
         let lead_ns = Columns::Em4.lead_ns(&payload);
         assert_eq!(lead_ns, 189_000);
-        assert_eq!(Columns::Em4.since_ns(19, lead_ns), 0);
-        assert_eq!(Columns::Em4.since_ns(20, lead_ns), 189_000);
+        let is_late = |row| angles.row(Columns::Em4, row).is_late;
+        assert_eq!([19, 20].map(is_late), [false, true]);
     }
 
     #[test]
     fn parts_of_columns_follow_the_number_of_the_packet() {
-        let rows = |columns: Columns, number: u16, returns: usize| {
+        let row = |columns: Columns, number: u16, returns: usize| {
             let payload = columns.encode(0, &column(number, 0, 1));
-            let slots: Vec<Slot> = columns.slots(&payload, returns).collect();
-            (slots[0].row, slots[slots.len() - 1])
+            columns.first_row(&payload, returns)
         };
-        let last = |row, echo| Slot { row, echo };
-        assert_eq!(rows(Columns::Em4, 1, 1), (0, last(259, 0)));
-        assert_eq!(rows(Columns::Em4, 2, 1), (260, last(519, 0)));
-        assert_eq!(rows(Columns::Em4, 7, 2), (260, last(389, 1)));
-        assert_eq!(rows(Columns::Emx, 5, 1), (0, last(191, 0)));
-        assert_eq!(rows(Columns::Emx, 6, 2), (96, last(191, 1)));
+        assert_eq!(row(Columns::Em4, 1, 1), 0);
+        assert_eq!(row(Columns::Em4, 2, 1), 260);
+        assert_eq!(row(Columns::Em4, 7, 2), 260);
+        assert_eq!(row(Columns::Emx, 5, 1), 0);
+        assert_eq!(row(Columns::Emx, 6, 2), 96);
     }
 }

@@ -1,7 +1,7 @@
 //! Packets that describe a unit: the pitch of the rows (DIFOP2), and serial number and clock of an E1.
 
 use super::super::difop;
-use super::columns::Columns;
+use super::columns::{Columns, RowAngles};
 use super::header::{u8_at, u16_at};
 use crate::packet::unit::UnitFile;
 use crate::packet::{PacketKind, UnitFacts};
@@ -100,10 +100,18 @@ impl Angles {
         is_told.then_some(angles)
     }
 
-    /// What is added to the yaw of a zone, and its sine and cosine.
-    #[inline]
-    pub fn zone(&self, zone: usize) -> (f64, (f64, f64)) {
-        self.zones.get(zone).copied().unwrap_or((0.0, (0.0, 1.0)))
+    /// Those of a row.
+    pub fn row(&self, columns: Columns, row: usize) -> RowAngles {
+        // Counted from 0 here, from 1 by the maker.
+        let zone = row / columns.zone_rows();
+        let told = self.zones.get(zone).copied();
+        let (offset_rad, offset) = told.unwrap_or((0.0, (0.0, 1.0)));
+        RowAngles {
+            pitch: self.pitch.get(row).copied().unwrap_or((0.0, 1.0)),
+            offset_rad,
+            offset,
+            is_late: !zone.is_multiple_of(2),
+        }
     }
 
     /// Those that a file tells, if it tells those of this model.

@@ -3,7 +3,7 @@
 //! Length and first bytes tell the model, and a type byte where it is known; but for an M1 Plus, which
 //! sends what an M1 sends.
 
-use super::blocks::{Block, Blocks, Point};
+use super::blocks::{Blocks, Point};
 use super::columns::Columns;
 use super::decoder::SolidDecoder;
 use super::description::{self, Angles};
@@ -11,8 +11,6 @@ use super::header;
 use super::joined;
 use crate::error::UnitError;
 use crate::loss::cycle::Restarts;
-use crate::packet::aim::Centidegrees;
-use crate::packet::batch::Batch;
 use crate::packet::echoes::RawEcho;
 use crate::packet::frames::place_rad;
 use crate::packet::unit::{Calibration, Fitted, UnitFacts, UnitFile};
@@ -45,8 +43,8 @@ pub struct Solid {
     kind: Option<u8>,
     /// What its packets hold.
     pub body: Body,
-    /// Smallest and largest range that is one, in units: the maker's limits.
-    limits: (u16, u16),
+    /// Ranges that are echoes: the maker's limits.
+    pub(super) limits: Limits,
     /// Number of the first packet of a frame.
     first: u32,
     /// Packets of a frame with one and with two returns.
@@ -89,7 +87,7 @@ pub static M1: Solid = Solid {
     candidates: &["m1-plus"],
     kind: Some(0x10),
     body: blocks(1210, 25, 47, 1, true, 5, Point::Angles),
-    limits: (40, 40_000),
+    limits: Limits(40, 40_000),
     first: 1,
     frame: (630, 1260),
     dual: ReturnMode::Dual,
@@ -127,7 +125,7 @@ pub static M2: Solid = Solid {
     candidates: &[],
     kind: None,
     body: blocks(1342, 25, 52, 1, true, 5, Point::Vector),
-    limits: (40, 50_000),
+    limits: Limits(40, 50_000),
     frame: (1260, 2520),
     ..M1
 };
@@ -136,7 +134,7 @@ pub static M3: Solid = Solid {
     id: "m3",
     title: "RoboSense M3",
     body: blocks(1448, 5, 282, 2, false, 28, Point::Vector),
-    limits: (20, 60_000),
+    limits: Limits(20, 60_000),
     frame: (2270, 4540),
     ..M2
 };
@@ -145,7 +143,7 @@ pub static MX: Solid = Solid {
     id: "mx",
     title: "RoboSense MX",
     body: blocks(1404, 50, 27, 1, false, 2, Point::Pair),
-    limits: (40, 40_000),
+    limits: Limits(40, 40_000),
     frame: (630, 630),
     ..M2
 };
@@ -155,7 +153,7 @@ pub static E1: Solid = Solid {
     title: "RoboSense E1",
     kind: Some(0x62),
     body: blocks(1200, 96, 12, 2, false, 1, Point::Vector),
-    limits: (1, 40_000),
+    limits: Limits(1, 40_000),
     first: 0,
     frame: (288, 576),
     ..M2
@@ -166,7 +164,7 @@ pub static EMX: Solid = Solid {
     title: "RoboSense EMX",
     kind: Some(0x42),
     body: Body::Columns(Columns::Emx),
-    limits: (40, 60_000),
+    limits: Limits(40, 60_000),
     frame: (1520, 3040),
     dual: ReturnMode::FirstLast,
     ..M2
@@ -177,11 +175,27 @@ pub static EM4: Solid = Solid {
     title: "RoboSense EM4",
     kind: Some(0x70),
     body: Body::Columns(Columns::Em4),
-    limits: (1, u16::MAX),
+    limits: Limits(1, u16::MAX),
     frame: (2400, 4800),
     dual: ReturnMode::FirstSecond,
     ..M2
 };
+
+/// Smallest and largest range that is one, in units.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits(u16, u16);
+
+impl Limits {
+    /// An echo, without range where it lies outside.
+    #[inline(always)]
+    pub fn cut(self, (range, intensity): (u16, u8)) -> RawEcho {
+        let is_inside = (self.0..=self.1).contains(&range);
+        RawEcho {
+            range: if is_inside { range } else { 0 },
+            intensity,
+        }
+    }
+}
 
 impl Solid {
     fn len(&self) -> usize {
@@ -247,18 +261,6 @@ impl Solid {
         }
     }
 
-    pub(super) fn cut(&self, (range, intensity): (u16, u8)) -> RawEcho {
-        let (least, most) = self.limits;
-        RawEcho {
-            range: if (least..=most).contains(&range) {
-                range
-            } else {
-                0
-            },
-            intensity,
-        }
-    }
-
     fn device_ns(&self, payload: &[u8]) -> i64 {
         let lead_ns = match self.body {
             Body::Blocks(_) => 0,
@@ -267,61 +269,11 @@ impl Solid {
         header::time_ns(payload).saturating_sub(lead_ns)
     }
 
-    /// Visits the echoes of shots whose returns do not stand side by side.
-    pub(super) fn singles(
-        &self,
-        blocks: Blocks,
-        payload: &[u8],
-        mut take: impl FnMut(Shot<'_>, RawEcho),
-    ) {
-        for (number, block) in blocks.blocks(payload).enumerate() {
-            for (channel, point) in block.points().enumerate() {
-                let echo = self.cut(blocks.point.echoes(point)[0]);
-                if echo.range != 0 {
-                    let shot = Shot {
-                        number,
-                        block,
-                        channel,
-                        point,
-                    };
-                    take(shot, echo);
-                }
-            }
-        }
+    /// Echoes of each shot, the second where two returns stand side by side.
+    fn echoes(&self, blocks: &Blocks, payload: &[u8]) -> impl Iterator<Item = [RawEcho; 2]> {
+        let points = blocks.blocks(payload).flat_map(|block| block.points());
+        points.map(move |point| blocks.point.echoes(point).map(|echo| self.limits.cut(echo)))
     }
-
-    /// Visits the shots of two returns side by side.
-    pub(super) fn pairs(
-        &self,
-        blocks: Blocks,
-        payload: &[u8],
-        mut take: impl FnMut(Shot<'_>, [RawEcho; 2]),
-    ) {
-        for (number, block) in blocks.blocks(payload).enumerate() {
-            for (channel, point) in block.points().enumerate() {
-                let echoes = blocks.point.echoes(point).map(|echo| self.cut(echo));
-                let shot = Shot {
-                    number,
-                    block,
-                    channel,
-                    point,
-                };
-                take(shot, echoes);
-            }
-        }
-    }
-}
-
-/// A shot of a block.
-pub struct Shot<'a> {
-    /// Of the block in the packet.
-    pub number: usize,
-    /// Where it stands.
-    pub block: Block<'a>,
-    /// Within the block.
-    pub channel: usize,
-    /// Its bytes.
-    pub point: &'a [u8],
 }
 
 impl Model for Solid {
@@ -390,17 +342,16 @@ impl Model for Solid {
         }
         let returns = self.returns(payload);
         match self.body {
-            Body::Blocks(blocks) if returns == 1 => {
-                self.singles(blocks, payload, |_, _| tally.points += 1);
+            Body::Blocks(blocks) => {
+                for [one, other] in self.echoes(&blocks, payload) {
+                    tally.add_pair(one.range, if returns == 2 { other.range } else { 0 });
+                }
             }
-            Body::Blocks(blocks) => self.pairs(blocks, payload, |_, [one, other]| {
-                tally.add_pair(one.range, other.range);
-            }),
             Body::Columns(columns) => {
-                let echo = |place: usize| self.cut(columns.echo(payload, place)).range;
-                for place in (0..columns.count()).step_by(returns) {
-                    let other = if returns == 2 { echo(place + 1) } else { 0 };
-                    tally.add_pair(echo(place), other);
+                let echo = |point| self.limits.cut(columns.echo(point)).range;
+                for shot in columns.points(payload).chunks_exact(returns) {
+                    let other = shot.get(1).map_or(0, echo);
+                    tally.add_pair(echo(&shot[0]), other);
                 }
             }
         }
@@ -441,15 +392,9 @@ impl Model for Solid {
     }
 
     fn fit(&self, files: &[UnitFile]) -> Result<Fitted, UnitError> {
-        let table = Centidegrees::table();
         let Body::Columns(columns) = self.body else {
             return Ok(Fitted {
-                decoder: Box::new(SolidDecoder {
-                    model: *self,
-                    table,
-                    angles: None,
-                    batch: Batch::default(),
-                }),
+                decoder: Box::new(SolidDecoder::new(*self, None)),
                 calibration: Calibration::Factory,
             });
         };
@@ -470,12 +415,7 @@ impl Model for Solid {
             }
         };
         Ok(Fitted {
-            decoder: Box::new(SolidDecoder {
-                model: *self,
-                table,
-                angles: Some(angles),
-                batch: Batch::default(),
-            }),
+            decoder: Box::new(SolidDecoder::new(*self, Some(&angles))),
             calibration,
         })
     }
