@@ -303,7 +303,7 @@ impl Shots {
 mod tests {
     use super::*;
     use crate::packet::velodyne::puck::{FIRING_NS, RANGE_UNIT_M, VLP16};
-    use crate::packet::velodyne::{LEN, RawBlock, encode};
+    use crate::packet::velodyne::{BLOCKS, LEN, RawBlock, encode};
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
