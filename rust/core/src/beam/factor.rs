@@ -1,8 +1,11 @@
 //! A positive matrix as the square of a triangle, block by block: products of blocks go at the speed of the
 //! machine, single columns at that of its memory.
 
-use nalgebra::{DMatrix, DMatrixViewMut, DVector};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector, Dyn};
 use rayon::prelude::*;
+
+use super::blank::blank;
+use super::triangle::solve_lower;
 
 /// Rows and columns of a block.
 const BLOCK: usize = 64;
@@ -10,6 +13,7 @@ const BLOCK: usize = 64;
 /// The lower triangle whose square is the matrix.
 #[derive(Debug, Clone)]
 pub struct Factor {
+    /// What stands above the diagonal means nothing.
     lower: DMatrix<f64>,
 }
 
@@ -28,7 +32,7 @@ impl Factor {
             blocks.for_each(|block| {
                 let wide = block.len() / width;
                 let mut block = DMatrixViewMut::from_slice(block, width, wide);
-                triangle.solve_lower_triangular_mut(&mut block);
+                solve_lower(&triangle, &mut block);
             });
             let down = across.transpose();
             matrix
@@ -45,15 +49,7 @@ impl Factor {
                     .gemm(-1.0, &left, &right, 1.0);
             });
         }
-        matrix.fill_upper_triangle(0.0, 1);
         Some(Self { lower: matrix })
-    }
-
-    /// That of the first `count` rows and columns.
-    pub fn first(&self, count: usize) -> Self {
-        Self {
-            lower: self.lower.view((0, 0), (count, count)).into_owned(),
-        }
     }
 
     /// The matrix' inverse times a vector.
@@ -66,9 +62,20 @@ impl Factor {
 
     /// The matrix' inverse.
     pub fn inverse(&self) -> DMatrix<f64> {
-        let (size, root) = (self.lower.nrows(), self.inverse_root());
-        let across = root.transpose();
-        let mut inverse = DMatrix::zeros(size, size);
+        self.inverse_of_first(self.lower.nrows())
+    }
+
+    /// The inverse of the first `size` rows and columns of the matrix.
+    pub fn inverse_of_first(&self, size: usize) -> DMatrix<f64> {
+        let root = self.inverse_root(size);
+        let across: DMatrixView<'_, f64, Dyn, Dyn> = DMatrixView::from_slice_with_strides_generic(
+            root.as_slice(),
+            Dyn(size),
+            Dyn(size),
+            Dyn(size),
+            Dyn(1),
+        );
+        let mut inverse = blank(size, size);
         let blocks = inverse.as_mut_slice().par_chunks_mut(BLOCK * size);
         blocks.enumerate().for_each(|(number, block)| {
             let (first, width) = (number * BLOCK, block.len() / size);
@@ -86,9 +93,8 @@ impl Factor {
     }
 
     /// Inverse of the triangle: blocks of its columns have nothing to do with each other.
-    fn inverse_root(&self) -> DMatrix<f64> {
-        let size = self.lower.nrows();
-        let mut root = DMatrix::zeros(size, size);
+    fn inverse_root(&self, size: usize) -> DMatrix<f64> {
+        let mut root = blank(size, size);
         let blocks = root.as_mut_slice().par_chunks_mut(BLOCK * size);
         blocks.enumerate().for_each(|(number, block)| {
             let width = block.len() / size;
@@ -104,11 +110,11 @@ impl Factor {
         block.view_mut((first, 0), (wide, wide)).fill_diagonal(1.0);
         for from in (first..size).step_by(BLOCK) {
             let width = BLOCK.min(size - from);
-            let corner = self.lower.view((from, from), (width, width));
+            let corner = self.lower.view((from, from), (width, width)).into_owned();
             let (above, mut below) = block.rows_range_pair_mut(first..from, from..from + width);
             let before = self.lower.view((from, first), (width, from - first));
             below.gemm(-1.0, &before, &above, 1.0);
-            corner.solve_lower_triangular_mut(&mut below);
+            solve_lower(&corner, &mut below);
         }
     }
 }
@@ -135,7 +141,7 @@ mod tests {
         assert!((&matrix * factor.solve(&right) - &right).amax() < 1e-8);
         let one = &matrix * factor.inverse();
         assert!((one - DMatrix::identity(SIZE, SIZE)).amax() < 1e-9);
-        let part = matrix.view((0, 0), (70, 70)) * factor.first(70).inverse();
+        let part = matrix.view((0, 0), (70, 70)) * factor.inverse_of_first(70);
         assert!((part - DMatrix::identity(70, 70)).amax() < 1e-9);
     }
 
