@@ -5,7 +5,6 @@ The order of a measurement, one line per step, stands in `Test.measure`.
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,7 +31,6 @@ from lidar_deflect.calibration import Calibration
 from lidar_deflect.checks import check
 from lidar_deflect.errors import ConfigError
 from lidar_deflect.measurement import METHODS, tabulate
-from lidar_deflect.measurement.beam.ahead import read_beside
 from lidar_deflect.measurement.contours import frame_plan
 from lidar_deflect.measurement.health import health_table
 from lidar_deflect.opened import OpenedTest
@@ -193,10 +191,8 @@ class Test:
         watch.lap("calibrate")
         inputs = rest.inputs
         frames = frame_plan(inputs, inputs.plan) if name == "paper" and inputs.plan else None
-        with read_beside(inputs) if name == "beam" else nullcontext() as ahead:
-            drifted = drift.watch(inputs, rest.cells, frames)
+        drifted = drift.watch(inputs, rest.cells, frames)
         inputs = replace(inputs, moves=drifted.moves, survey=drifted.survey)
-        inputs = replace(inputs, ahead=None if drifted.moves else ahead)
         watch.lap("drift")
         states = drift.marked(_method(name)(inputs), drifted)
         watch.lap("measure")

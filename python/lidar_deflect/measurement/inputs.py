@@ -50,8 +50,6 @@ class Inputs:
         What the paper's method needs to know beforehand, where that was settled already.
     survey
         First pass over the frames, where it was made while the tripods were watched.
-    ahead
-        Waits for what the beam method's spans show, where that was read meanwhile.
     """
 
     config: Config
@@ -69,7 +67,6 @@ class Inputs:
     moves: tuple[Move, ...] = ()
     plan: Plan | None = None
     survey: _native.DistancePass | None = None
-    ahead: Callable[[], Mapping[tuple[int, int], _native.BeamSeen]] | None = None
 
     @property
     def period_ns(self) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 from lidar_deflect.errors import MeasurementError
 from lidar_deflect.measurement.beam import clocks, rotation
-from lidar_deflect.measurement.beam.adjustment import Solved, solve
+from lidar_deflect.measurement.beam.adjustment import Solved, solve, spans_of
 from lidar_deflect.measurement.beam.budget import budget_of
 from lidar_deflect.measurement.beam.check import checks, loose_edges, objects
 from lidar_deflect.measurement.beam.expected import expected_of
@@ -20,7 +20,6 @@ from lidar_deflect.measurement.beam.following import Followed, few, follow
 from lidar_deflect.measurement.beam.kept import Kept, calibrated_reference
 from lidar_deflect.measurement.beam.outline import outline_of
 from lidar_deflect.measurement.beam.schedule import LAST
-from lidar_deflect.measurement.beam.seen import spans_of
 from lidar_deflect.measurement.beam.stretches import stretches_of
 from lidar_deflect.measurement.beam.swung import widened
 from lidar_deflect.measurement.beam.uncertainty import HoldCovariance, over_time

@@ -14,7 +14,6 @@ from lidar_deflect.measurement.beam.clocks import unknown
 from lidar_deflect.measurement.beam.drawing import Drawing, drawing_of
 from lidar_deflect.measurement.beam.rig import RigPrior, rig_prior
 from lidar_deflect.measurement.beam.schedule import DRAWN, SETTLED, UNDRAWN
-from lidar_deflect.measurement.beam.seen import seen_in, spans_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -29,6 +28,12 @@ if TYPE_CHECKING:
 
     Floats = NDArray[np.float64]
 
+MARGIN_NS = 150_000_000
+"""A hold begins so long after the load says so, and ends so long before: a ramp moves fast."""
+SHORTEST_NS = 700_000_000
+"""A shorter hold is no hold."""
+LONGEST_NS = 6_000_000_000
+"""More of a hold adds time, not accuracy."""
 SEEN_SHARE = 0.45
 """The surface is free to differ from the drawing outboard of this share of the length."""
 ECHOES, ECHOES_GENERIC = 8_000, 20_000
@@ -75,6 +80,41 @@ class Solved:
     ahead: Sequence[_native.BeamSeen]
 
 
+def spans_of(inputs: Inputs, holds: Sequence[Hold]) -> list[tuple[Hold, tuple[int, int]]]:
+    """Return holds with the stretch of each that is used, within the limits of the measurement."""
+    spans = []
+    for hold in holds:
+        start = max(hold.from_ns + MARGIN_NS, inputs.start_ns)
+        stop = min(hold.to_ns - MARGIN_NS, inputs.stop_ns, start + LONGEST_NS)
+        if stop - start >= SHORTEST_NS:
+            spans.append((hold, (start, stop)))
+    return spans
+
+
+def reading(inputs: Inputs, plan: Plan, windows_ns: Sequence[tuple[int, int]]) -> _native.BeamFeed:
+    """Read what the lidars saw of the blade, window by window in the order of their starts."""
+    return _native.BeamFeed(
+        inputs.capture.native,
+        lidars=inputs.capture.numbers(inputs.lidars),
+        poses=inputs.poses,
+        cut_azimuth_deg=plan.cuts_deg(inputs.lidars),
+        box_m=np.ascontiguousarray(plan.box_m),
+        windows_ns=list(windows_ns),
+        moves=inputs.native_moves,
+        threads=inputs.threads,
+    )
+
+
+def _seen_in(
+    inputs: Inputs, plan: Plan, spans_ns: Sequence[tuple[int, int]]
+) -> list[_native.BeamSeen]:
+    """Return what was seen in spans that may come in any order."""
+    order = sorted(range(len(spans_ns)), key=lambda place: spans_ns[place])
+    feed = reading(inputs, plan, [spans_ns[place] for place in order])
+    found = dict(zip(order, feed.take(len(order), inputs.listener("read")), strict=True))
+    return [found[place] for place in range(len(order))]
+
+
 def solve(inputs: Inputs, expected: Expected, ahead_ns: Sequence[tuple[int, int]] = ()) -> Solved:
     """Adjust all holds together; `ahead_ns` are spans that are wanted later, read with them.
 
@@ -98,7 +138,7 @@ def solve(inputs: Inputs, expected: Expected, ahead_ns: Sequence[tuple[int, int]
     drawing = drawing_of(inputs)
     plan = paper.plan_of(inputs)
     rig = rig_prior(inputs)
-    seen = seen_in(inputs, plan, [*spans, *ahead_ns])
+    seen = _seen_in(inputs, plan, [*spans, *ahead_ns])
     ahead = seen[len(spans) :]
     native = _started(inputs, drawing, rig, expected, seen[: len(spans)], spans, shares)
     schedule = UNDRAWN if drawing.source == "generic" else DRAWN

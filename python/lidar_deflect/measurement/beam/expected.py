@@ -78,17 +78,6 @@ def expected_of(inputs: Inputs) -> Expected:
     MeasurementError
         If there is neither a load channel with a prediction nor a result of the paper's method.
     """
-    return given(inputs) or _from_paper(inputs)
-
-
-def given(inputs: Inputs) -> Expected | None:
-    """Take load and prediction as configured; None where one lacks.
-
-    Raises
-    ------
-    MeasurementError
-        If a blade is swung from a rest that is not in these captures.
-    """
     if inputs.config.test.kind == "fatigue":
         return swung(inputs)
     load, predicted = inputs.load, instruments.prediction(inputs.config)
@@ -103,7 +92,7 @@ def given(inputs: Inputs) -> Expected | None:
             direction=_direction(inputs),
             source="channel",
         )
-    return None
+    return _from_paper(inputs)
 
 
 def swung(inputs: Inputs) -> Expected:

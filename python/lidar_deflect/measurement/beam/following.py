@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lidar_deflect.measurement.beam import clocks
-from lidar_deflect.measurement.beam.adjustment import by_lidar
+from lidar_deflect.measurement.beam.adjustment import by_lidar, reading
 from lidar_deflect.measurement.beam.schedule import LAST
-from lidar_deflect.measurement.beam.seen import reading
 from lidar_deflect.measurement.beam.uncertainty import Spreads
 
 if TYPE_CHECKING:
