@@ -69,8 +69,10 @@ class Rest:
             known = with_unloaded_state(opened, known, clouds, window)
             clouds, window = {}, None
         inputs = opened.inputs(known, clouds, window, limits=limits, rate_hz=rate_hz)
-        inputs = replace(inputs, plan=paper.plan_of(inputs))
-        cells = drift.static_cells(inputs)
+        with ThreadPoolExecutor(1) as beside:
+            plan = beside.submit(paper.plan_of, inputs)
+            cells = drift.static_cells(inputs)
+            inputs = replace(inputs, plan=plan.result())
         return cls(inputs if method == "beam" else replace(inputs, clouds={}), cells)
 
     @classmethod

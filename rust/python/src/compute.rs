@@ -1,6 +1,7 @@
 //! The one way into long computations: without the interpreter lock, on a pool of their own.
 
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::Thread;
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -33,12 +34,20 @@ pub fn interruptible<T: Send>(
     py: Python<'_>,
     work: impl FnOnce(&AtomicBool) -> T + Send,
 ) -> BorderResult<T> {
-    let stop = AtomicBool::new(false);
+    let (stop, is_over) = (AtomicBool::new(false), AtomicBool::new(false));
+    let end = Waker {
+        is_over: &is_over,
+        waits: std::thread::current(),
+    };
     let (result, signal) = std::thread::scope(|scope| {
-        let worker = scope.spawn(|| work(&stop));
+        let flag = &stop;
+        let worker = scope.spawn(move || {
+            let _end = end;
+            work(flag)
+        });
         let mut signal = Ok(());
-        while !worker.is_finished() {
-            py.detach(|| std::thread::sleep(LOOK));
+        while !is_over.load(Ordering::Acquire) {
+            py.detach(|| std::thread::park_timeout(LOOK));
             if signal.is_ok() {
                 signal = py.check_signals();
                 stop.store(signal.is_err(), Ordering::Relaxed);
@@ -48,6 +57,19 @@ pub fn interruptible<T: Send>(
     });
     signal?;
     Ok(result.unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+}
+
+/// Wakes who waits for the end of some work when it goes, whether the work came to it or panicked.
+struct Waker<'a> {
+    is_over: &'a AtomicBool,
+    waits: Thread,
+}
+
+impl Drop for Waker<'_> {
+    fn drop(&mut self) {
+        self.is_over.store(true, Ordering::Release);
+        self.waits.unpark();
+    }
 }
 
 /// As [`compute`], for work that looks at the flag of [`interruptible`] now and then.

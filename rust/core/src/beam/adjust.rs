@@ -15,6 +15,7 @@ use super::family::{self, Equilibrium, Kind, Loading, Response, Trust, Unknown};
 use super::layout::Layout;
 use super::mesh::Mesh;
 use super::normal::Normal;
+use super::pairs::Knotted;
 use super::posed::{Posed, knots};
 use super::rig::{Lidar, Rig};
 use super::rows::Rows;
@@ -398,6 +399,11 @@ impl Adjustment {
             .chain([strain])
     }
 
+    /// The waves of the surface.
+    pub(super) fn waves(&self) -> Knotted {
+        self.problem.shape.wave_knots(self.layout.shape_at())
+    }
+
     /// The axis of a hold without sway, by the slopes of the last equilibrium.
     pub(super) fn still(&self, hold: usize) -> Axis {
         let (linear, problem) = (&self.linear[hold], &self.problem);
@@ -444,16 +450,14 @@ impl Adjustment {
     /// Normal equations at the present unknowns, with what became of the data.
     pub fn normal(&self, gates: &Gates) -> (Normal, Vec<Tally>) {
         let lidars = self.lidars();
-        let parts: Vec<(Part, Tally)> = (0..self.problem.holds.len())
-            .into_par_iter()
-            .map(|hold| Rows::new(self, hold, &lidars, gates).collect())
-            .collect();
-        let mut sum = self.prior(gates.stage);
-        let mut tallies = Vec::new();
-        for (part, tally) in parts {
-            sum.join(&part);
-            tallies.push(tally);
-        }
+        let of = |hold| Rows::new(self, hold, &lidars, gates).collect();
+        let holds = (0..self.problem.holds.len()).into_par_iter();
+        let (parts, mut sum) = rayon::join(
+            || holds.map(of).collect::<Vec<_>>(),
+            || self.prior(gates.stage),
+        );
+        let (parts, tallies): (Vec<Part>, Vec<Tally>) = parts.into_iter().unzip();
+        parts.iter().for_each(|part| sum.join(part));
         (sum, tallies)
     }
 }

@@ -1,6 +1,8 @@
 //! How well single instants are known: the covariance of everything the holds told, carried to a
 //! state by its derivatives.
 
+use std::sync::Arc;
+
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3};
 use rayon::prelude::*;
 
@@ -17,7 +19,7 @@ pub struct Knowledge {
     /// The sections in the first hold.
     pub rests: Rests,
     /// Covariance of all unknowns.
-    covariance: DMatrix<f64>,
+    covariance: Arc<DMatrix<f64>>,
     /// Covariance of all unknowns with x, y, z of the sections in the first hold, ...
     rest_carried: DMatrix<f64>,
     /// ... and that of x, y, z of each section by itself.
@@ -96,7 +98,7 @@ impl Spread {
 impl Adjustment {
     /// The sections at `s_m` of all holds, and what states of single instants need.
     pub fn knowledge(&self, s_m: &[f64], solution: &Solution) -> (Sections, Knowledge) {
-        let covariance = solution.covariance.clone();
+        let covariance = Arc::clone(&solution.covariance);
         let rests = self.rests(s_m);
         let (values, rows) = self.section_rows(&rests);
         let columns: Vec<usize> = (0..3 * s_m.len()).map(|k| 4 * (k / 3) + k % 3).collect();
@@ -125,35 +127,35 @@ impl Adjustment {
         times_ns: &[i64],
         each: usize,
     ) -> (Vec<[f64; 4]>, Vec<Spread>) {
-        let (posed, mut values, mut spreads) = (self.posed(hold), Vec::new(), Vec::new());
-        let at = |time_ns: i64| {
-            let (states, mut rows) = self.states_at(&knowledge.rests, &posed, hold, time_ns);
-            self.fill_rests(&mut rows, knowledge, &posed, hold, time_ns);
-            (states, rows)
+        let (posed, rests) = (self.posed(hold), &knowledge.rests);
+        let spreads = |rests: &Rests, time_ns: i64| {
+            let mut rows = self.states_at(rests, &posed, hold, time_ns).1;
+            self.fill_rests(&mut rows, rests, &posed, hold, time_ns);
+            knowledge.spreads(&rows)
         };
         let Some(middle) = times_ns.get(times_ns.len() / 2) else {
-            return (values, spreads);
+            return (Vec::new(), Vec::new());
         };
-        let others = knowledge.spreads(&at(*middle).1);
-        for time_ns in times_ns {
-            let (states, rows) = at(*time_ns);
-            values.extend(states);
-            spreads.extend(knowledge.spreads(&rows.columns(0, 4 * each).into_owned()));
+        let (others, few) = (spreads(rests, *middle), rests.first(each));
+        let of_each = |time_ns: &i64| {
+            let mut spreads = spreads(&few, *time_ns);
             spreads.extend_from_slice(&others[each..]);
-        }
-        (values, spreads)
+            (self.values_at(rests, &posed, hold, *time_ns), spreads)
+        };
+        let found: Vec<_> = times_ns.par_iter().map(of_each).collect();
+        let (values, spreads): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        (values.concat(), spreads.concat())
     }
 
     /// Adds to the slopes of a state's twists those by the first hold.
     fn fill_rests(
         &self,
         rows: &mut DMatrix<f64>,
-        knowledge: &Knowledge,
+        rests: &Rests,
         posed: &Posed,
         hold: usize,
         time_ns: i64,
     ) {
-        let rests = &knowledge.rests;
         for (k, (s_m, rest)) in rests.s_m.iter().zip(&rests.places).enumerate() {
             let at = self.place_at(posed, hold, *s_m, Some(time_ns));
             self.fill_rest(rows, 4 * k + 3, &rests.posed, rest, &at);
@@ -280,8 +282,9 @@ mod tests {
         variance: f64,
     ) -> Matrix3<f64> {
         let mut knowledge = knowledge.clone();
-        knowledge.covariance.fill(0.0);
-        knowledge.covariance[(unknown, unknown)] = variance;
+        let covariance = Arc::make_mut(&mut knowledge.covariance);
+        covariance.fill(0.0);
+        covariance[(unknown, unknown)] = variance;
         let stretch = stretch(holds);
         let mut part = holds.stretch(&stretch, &[1.0]).unwrap();
         for _ in 0..3 {
@@ -351,7 +354,7 @@ mod tests {
         let (_, knowledge) = holds.knowledge(&[50.0, 55.0], &solution);
         let posed = holds.posed(0);
         let (_, rows) = holds.states_at(&knowledge.rests, &posed, 0, TIME_NS);
-        let whole = rows.transpose() * &knowledge.covariance * &rows;
+        let whole = rows.transpose() * &*knowledge.covariance * &rows;
         let found = knowledge.spreads(&rows);
         for (k, spread) in found.iter().enumerate() {
             let expected = whole.fixed_view::<3, 3>(4 * k, 4 * k);

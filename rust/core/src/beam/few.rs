@@ -34,8 +34,7 @@ impl Few {
 
     /// Covariance of the values with others.
     pub(super) fn with(&self, other: &Self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
-        let both = covariance.select_columns(&other.unknowns);
-        let carried = both.select_rows(&self.unknowns) * &other.slopes;
+        let carried = block(covariance, &self.unknowns, &other.unknowns) * &other.slopes;
         self.slopes.tr_mul(&carried)
     }
 
@@ -58,9 +57,18 @@ impl Few {
 
     /// Covariance of the unknowns that move the values with these.
     pub(super) fn own_carried(&self, covariance: &DMatrix<f64>) -> DMatrix<f64> {
-        let own = covariance.select_columns(&self.unknowns);
-        own.select_rows(&self.unknowns) * &self.slopes
+        block(covariance, &self.unknowns, &self.unknowns) * &self.slopes
     }
+}
+
+/// Some rows and columns of a matrix.
+fn block(matrix: &DMatrix<f64>, rows: &[usize], columns: &[usize]) -> DMatrix<f64> {
+    let mut entries = Vec::with_capacity(rows.len() * columns.len());
+    for column in columns {
+        let column = matrix.column(*column);
+        entries.extend(rows.iter().map(|row| column[*row]));
+    }
+    DMatrix::from_vec(rows.len(), columns.len(), entries)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
+use super::blank::blank;
 use super::factor::Factor;
 use super::sums::Part;
 
@@ -29,7 +30,7 @@ impl Normal {
     /// Of some of the unknowns, without any row.
     pub fn new(asked: &Range<usize>, free: &Range<usize>) -> Self {
         Self {
-            matrix: DMatrix::zeros(asked.len(), free.len()),
+            matrix: blank(asked.len(), free.len()),
             right: DVector::zeros(asked.len()),
             cost: 0.0,
             rows: 0,
@@ -51,31 +52,22 @@ impl Normal {
             }
         }
         self.join_others(part);
-        self.cost += part.own[(0, 0)];
         self.rows += part.rows;
     }
 
-    /// Others rise, and those that follow each other lie together here and there.
     fn join_others(&mut self, part: &Part) {
         let start = self.asked.start;
-        for (place, unknown) in part.others.iter().enumerate() {
-            self.right[unknown - start] += part.own[(place + 1, 0)];
+        for (place, sum) in part.own.column(0) {
+            match place.checked_sub(1) {
+                Some(other) => self.right[part.others[other] - start] += sum,
+                None => self.cost += sum,
+            }
         }
-        let follow = |a: &usize, b: &usize| a + 1 == *b;
-        let runs: Vec<&[usize]> = part.others.chunk_by(follow).collect();
-        let columns = part.own.ncols() - 1;
-        for (j, unknown) in part.others.iter().take(columns).enumerate() {
-            let of_column = part.own.column(j + 1);
-            let mut sums = &of_column.as_slice()[1..];
+        for (j, unknown) in part.others.iter().take(part.own.len() - 1).enumerate() {
             let mut column = self.matrix.column_mut(unknown - self.free.start);
             let column = column.as_mut_slice();
-            for run in &runs {
-                let (of_run, behind) = sums.split_at(run.len());
-                sums = behind;
-                // What lies above the diagonal is not summed.
-                let skipped = unknown.saturating_sub(run[0]).min(run.len());
-                let sum = column[run[0] - start..].iter_mut().zip(of_run);
-                sum.skip(skipped).for_each(|(sum, more)| *sum += more);
+            for (place, sum) in part.own.column(j + 1) {
+                column[part.others[place - 1] - start] += sum;
             }
         }
     }

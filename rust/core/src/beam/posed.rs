@@ -1,6 +1,7 @@
 //! A hold as the present unknowns have it: the blade at all its instants, and what moves it.
 
 use nalgebra::{DMatrix, Vector3};
+use rayon::prelude::*;
 
 use super::axis::{Axis, Field};
 use super::family::{self, Response};
@@ -11,6 +12,9 @@ use super::sums::{BOTH, MOVES};
 
 /// Time between two shapes of the blade, nanoseconds; linear in between.
 const GRID_NS: i64 = 20_000_000;
+/// Fewer shapes are not worth another thread.
+const SHAPES: usize = 16;
+
 /// Coefficients of cubic splines with knots so far apart over a span of time.
 pub fn knots(span_ns: (i64, i64), knot_ns: i64) -> usize {
     ((span_ns.1 - span_ns.0).max(0) / knot_ns) as usize + 4
@@ -50,8 +54,8 @@ impl Posed {
         let moves = |all: &[Response]| flat(mesh, &family::fields(mesh, &still, all));
         let knots = knots(span_ns, knot_ns);
         let steps = (span_ns.1 - span_ns.0) / GRID_NS + 2;
-        let shape = |step: i64| {
-            let (first, weights) = splines((step * GRID_NS) as f64 / knot_ns as f64, knots);
+        let shape = |step: usize| {
+            let (first, weights) = splines((step as i64 * GRID_NS) as f64 / knot_ns as f64, knots);
             let mut curvature = still.curvature.clone();
             for (mode, response) in sway.iter().enumerate() {
                 let of = &coefficients[mode * knots..][..knots];
@@ -64,7 +68,11 @@ impl Posed {
         Self {
             start_ns: span_ns.0,
             knot_ns,
-            shapes: (0..steps).map(shape).collect(),
+            shapes: (0..steps as usize)
+                .into_par_iter()
+                .with_min_len(SHAPES)
+                .map(shape)
+                .collect(),
             moves: moves(responses),
             sway_moves: moves(sway),
             unknowns: responses.len(),

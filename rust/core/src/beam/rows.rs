@@ -2,6 +2,8 @@
 
 mod edges;
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use super::adjust::{Adjustment, Gates, RANGE_M};
@@ -9,6 +11,7 @@ use super::bill::Bill;
 use super::common;
 use super::echoes::{Echo, Edge};
 use super::layout::{Layout, RANGES, RIG};
+use super::mesh::Mesh;
 use super::posed::{Posed, node_slopes};
 use super::rig::Lidar;
 use super::sight::{Contact, Hit};
@@ -65,13 +68,19 @@ impl Places {
     }
 }
 
+/// Arc length of a contact, metres.
+fn arc_m(mesh: &Mesh, contact: &Contact) -> f64 {
+    let section = &contact.section;
+    mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
+}
+
 /// Makes the rows of one hold.
 pub struct Rows<'a> {
     pub(super) adjustment: &'a Adjustment,
     pub(super) lidars: &'a [Lidar],
     pub(super) gates: &'a Gates,
     pub(super) hold: usize,
-    pub(super) posed: Posed,
+    pub(super) posed: Arc<Posed>,
     sums: Sums,
     entries: Vec<(usize, f64)>,
     places: Places,
@@ -82,8 +91,6 @@ pub struct Rows<'a> {
     keeps: bool,
     /// Whether it is the cost alone that is wanted.
     pub(super) only_costs: bool,
-    /// Where the last edge lay, arc length in metres.
-    last_edge_m: Option<f64>,
     pub(super) echo_bill: Bill,
     edge_bill: Bill,
     pub(super) tally: Tally,
@@ -102,12 +109,13 @@ impl<'a> Rows<'a> {
             lidars,
             gates,
             hold,
-            posed: adjustment.posed(hold),
+            posed: Arc::new(adjustment.posed(hold)),
             sums: Sums::new(
                 adjustment.problem.mesh.len(),
                 adjustment.touched_at(hold),
                 &adjustment.asked,
                 &adjustment.free,
+                &adjustment.waves(),
             ),
             entries: Vec::new(),
             places: Places::of(&adjustment.layout, hold),
@@ -124,7 +132,6 @@ impl<'a> Rows<'a> {
             edge_bill: Bill::new(is_judged),
             keeps: gates.is_fine() || !adjustment.follows_load,
             only_costs: false,
-            last_edge_m: None,
             tally: Tally::default(),
             adjustment,
         }
@@ -158,13 +165,11 @@ impl<'a> Rows<'a> {
         if self.keeps {
             self.tally.used.reserve(echoes.min(seen.echoes.len()));
         }
-        let mut hint = None;
-        for echo in some(&seen.echoes, echoes) {
-            hint = self.add_echo(echo, hint);
-        }
-        for edge in some_edges(&seen.edges, edges) {
-            self.add_edge(edge);
-        }
+        let take = |rows: &mut Self| {
+            let echoes = some(&seen.echoes, echoes);
+            echoes.fold(None, |hint, echo| rows.add_echo(echo, hint));
+        };
+        self.take(take, edges);
     }
 
     /// How many echoes and how many edges are used: few to come near. Without a drawing steps are held back
@@ -181,14 +186,6 @@ impl<'a> Rows<'a> {
             true => (most, usize::MAX),
             false => (most.min(wide.0), wide.1),
         }
-    }
-
-    /// The rows of the edges alone.
-    pub(super) fn of_edges(mut self) -> Part {
-        for edge in &self.adjustment.problem.holds[self.hold].seen.edges {
-            self.add_edge(edge);
-        }
-        self.finish().0
     }
 
     pub(super) fn finish(mut self) -> (Part, Tally) {
@@ -313,9 +310,7 @@ impl<'a> Rows<'a> {
     }
 
     fn arc_m(&self, contact: &Contact) -> f64 {
-        let mesh = &self.adjustment.problem.mesh;
-        let section = &contact.section;
-        mesh.s_m[section.node] + section.share * mesh.step_m(section.node)
+        arc_m(&self.adjustment.problem.mesh, contact)
     }
 
     fn patch(&self, contact: &Contact, s_m: f64) -> usize {

@@ -1,6 +1,7 @@
 //! Where the material sections of a hold are, how they are twisted, and how well that is known.
 
 use nalgebra::{DMatrix, Rotation3, Vector3};
+use rayon::prelude::*;
 
 use super::adjust::Adjustment;
 use super::mesh::Mesh;
@@ -26,6 +27,17 @@ pub struct Rests {
     pub(super) places: Vec<Place>,
 }
 
+impl Rests {
+    /// The first `count` of the sections.
+    pub(super) fn first(&self, count: usize) -> Self {
+        Self {
+            s_m: self.s_m[..count].to_vec(),
+            posed: self.posed.clone(),
+            places: self.places[..count].to_vec(),
+        }
+    }
+}
+
 /// One section of one state.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
@@ -39,17 +51,23 @@ impl Adjustment {
     /// The sections at `s_m` of all holds, and how all unknowns move them: columns in the order of the
     /// values.
     pub(super) fn section_rows(&self, rests: &Rests) -> (Vec<[f64; 4]>, DMatrix<f64>) {
-        let holds = self.problem.holds.len();
-        let count = holds * rests.s_m.len();
-        let mut values = Vec::with_capacity(count);
-        let mut rows = DMatrix::zeros(self.layout.len(), 4 * count);
-        for hold in 0..holds {
-            let posed = self.posed(hold);
-            for (s_m, rest) in rests.s_m.iter().zip(&rests.places) {
-                let (at, first) = (self.place_at(&posed, hold, *s_m, None), 4 * values.len());
-                values.push(self.fill_state(&mut rows, first, &posed, hold, &at, rest));
-                self.fill_rest(&mut rows, first + 3, &rests.posed, rest, &at);
-            }
+        let holds = (0..self.problem.holds.len()).into_par_iter();
+        let found: Vec<_> = holds.map(|hold| self.hold_rows(rests, hold)).collect();
+        let (values, rows): (Vec<_>, Vec<_>) = found.into_iter().unzip();
+        let count = 4 * values.iter().map(Vec::len).sum::<usize>();
+        let columns: Vec<Vec<f64>> = rows.into_iter().map(|of| of.data.into()).collect();
+        let rows = DMatrix::from_vec(self.layout.len(), count, columns.concat());
+        (values.concat(), rows)
+    }
+
+    fn hold_rows(&self, rests: &Rests, hold: usize) -> (Vec<[f64; 4]>, DMatrix<f64>) {
+        let posed = self.posed(hold);
+        let mut values = Vec::with_capacity(rests.s_m.len());
+        let mut rows = DMatrix::zeros(self.layout.len(), 4 * rests.s_m.len());
+        for (s_m, rest) in rests.s_m.iter().zip(&rests.places) {
+            let (at, first) = (self.place_at(&posed, hold, *s_m, None), 4 * values.len());
+            values.push(self.fill_state(&mut rows, first, &posed, hold, &at, rest));
+            self.fill_rest(&mut rows, first + 3, &rests.posed, rest, &at);
         }
         (values, rows)
     }
@@ -76,7 +94,7 @@ impl Adjustment {
         rest: &Place,
         at: &Place,
     ) {
-        let (_, slopes) = twist(&self.problem.mesh, rest, at);
+        let slopes = twist_slopes(&self.problem.mesh, rest, at);
         self.fill(
             rows,
             column,
@@ -108,7 +126,7 @@ impl Adjustment {
                 &Vector3::zeros(),
             );
         }
-        let (twist, slopes) = twist(&self.problem.mesh, rest, at);
+        let slopes = twist_slopes(&self.problem.mesh, rest, at);
         self.fill(
             rows,
             first + 3,
@@ -117,6 +135,13 @@ impl Adjustment {
             &Vector3::zeros(),
             &slopes[1],
         );
+        self.state_of(at, rest)
+    }
+
+    /// Position and twist of a section.
+    pub(super) fn state_of(&self, at: &Place, rest: &Place) -> [f64; 4] {
+        let still = [Vector3::zeros(); 2];
+        let twist = twist(&self.problem.mesh, rest, at, &still);
         [at.point.x, at.point.y, at.point.z, twist]
     }
 
@@ -227,35 +252,30 @@ impl Adjustment {
     }
 }
 
-/// Twist change from one state to another, positive as in the drawing, and its slopes by rotations of
-/// both sections about the world axes.
-fn twist(mesh: &Mesh, rest: &Place, now: &Place) -> (f64, [Vector3<f64>; 2]) {
-    let of = |rest_turn: &Vector3<f64>, turn: &Vector3<f64>| {
-        let (a, b) = (
-            Rotation3::from_scaled_axis(*rest_turn),
-            Rotation3::from_scaled_axis(*turn),
-        );
-        mesh.hand
-            * twist_rad(
-                &(a * tangent(&rest.contact.section)),
-                &(a * rest.chord),
-                &(b * tangent(&now.contact.section)),
-                &(b * now.chord),
-            )
-    };
-    let zero = Vector3::zeros();
-    let step = 1e-5;
-    let slope = |of: &dyn Fn(&Vector3<f64>) -> f64| {
+/// Twist change from one state to another, positive as in the drawing, once both sections are turned about
+/// the world axes.
+fn twist(mesh: &Mesh, rest: &Place, now: &Place, turns: &[Vector3<f64>; 2]) -> f64 {
+    let [a, b] = turns.map(Rotation3::from_scaled_axis);
+    mesh.hand
+        * twist_rad(
+            &(a * tangent(&rest.contact.section)),
+            &(a * rest.chord),
+            &(b * tangent(&now.contact.section)),
+            &(b * now.chord),
+        )
+}
+
+/// Slopes of the twist change by rotations of both sections.
+fn twist_slopes(mesh: &Mesh, rest: &Place, now: &Place) -> [Vector3<f64>; 2] {
+    let (zero, step) = (Vector3::zeros(), 1e-5);
+    let slope = |turned: &dyn Fn(Vector3<f64>) -> [Vector3<f64>; 2]| {
+        let of = |turn| twist(mesh, rest, now, &turned(turn));
         Vector3::from_fn(|axis, _| {
             let turn = Vector3::ith(axis, step);
-            (of(&turn) - of(&-turn)) / (2.0 * step)
+            (of(turn) - of(-turn)) / (2.0 * step)
         })
     };
-    let slopes = [
-        slope(&|turn| of(turn, &zero)),
-        slope(&|turn| of(&zero, turn)),
-    ];
-    (of(&zero, &zero), slopes)
+    [slope(&|turn| [turn, zero]), slope(&|turn| [zero, turn])]
 }
 
 fn tangent(section: &Section) -> Vector3<f64> {

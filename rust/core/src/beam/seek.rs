@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::adjust::{Adjustment, Gates, Stage};
 use super::echoes::Echo;
 use super::near::Near;
-use super::rows::{MIXED_ECHOES, Rows, some, some_edges};
+use super::rows::{MIXED_ECHOES, Rows, some};
 use super::step::Step;
 use super::weights::{Tally, robust};
 use crate::error::BeamError;
@@ -89,12 +89,10 @@ impl Rows<'_> {
             _ if self.adjustment.is_vague() => (UNDRAWN, 1.0),
             _ => (DRAWN, 1.0),
         };
-        for echo in some(&seen.echoes, echoes) {
-            self.add_point(echo, alike);
-        }
-        for edge in some_edges(&seen.edges, edges) {
-            self.add_edge(edge);
-        }
+        let take = |rows: &mut Self| {
+            some(&seen.echoes, echoes).for_each(|echo| rows.add_point(echo, alike));
+        };
+        self.take(take, edges);
     }
 
     fn add_point(&mut self, echo: &Echo, alike: f64) {

@@ -8,6 +8,7 @@ use std::f64::consts::PI;
 
 use self::forms::{FORMS, forms};
 use super::mesh::Mesh;
+use super::pairs::Knotted;
 use super::sight::Contact;
 use super::table;
 use nalgebra::Vector3;
@@ -138,6 +139,14 @@ impl Shape {
     /// Number of the first wave.
     pub fn waves_from(&self) -> usize {
         self.waves.first
+    }
+
+    /// The waves, where the surface's unknowns begin with `first`.
+    pub fn wave_knots(&self, first: usize) -> Knotted {
+        Knotted {
+            all: first + self.waves.first..first + self.waves.end(),
+            each: self.waves.each,
+        }
     }
 
     /// Whether there is none: never.

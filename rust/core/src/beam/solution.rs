@@ -1,5 +1,7 @@
 //! The normal equations at an estimate, solved once for all that is asked of it.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 
 use super::adjust::{Adjustment, Gates};
@@ -15,7 +17,7 @@ pub struct Solution {
     /// Within what they lay.
     pub gates: Gates,
     /// Covariance of all unknowns.
-    pub(super) covariance: DMatrix<f64>,
+    pub(super) covariance: Arc<DMatrix<f64>>,
     /// Axial strain of each hold, fitted beside all else as if the blade did not keep its length: a
     /// check, for a blade stretches by less than a ten thousandth.
     pub strain: DVector<f64>,
@@ -42,7 +44,7 @@ impl Adjustment {
         }
         Ok(Solution {
             gates: *gates,
-            covariance: factor.first(count).inverse(),
+            covariance: Arc::new(factor.inverse_of_first(count)),
             strain: step.rows(count, holds).into_owned(),
             strain_covariance: spread,
         })

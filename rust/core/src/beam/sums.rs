@@ -9,6 +9,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DMatrixView};
 
+use super::blank::blank;
+use super::pairs::{Knotted, Pairs};
 use super::panel::Panel;
 
 /// Moves of a node: three rotations, three displacements.
@@ -47,8 +49,8 @@ pub struct Sums {
     near: DMatrix<f64>,
     /// Others with moves: a column per move.
     cross: DMatrix<f64>,
-    /// Others with each other: a column for those that are solved for, the lower triangle alone.
-    own: DMatrix<f64>,
+    /// Others with each other: a column for those that are solved for.
+    own: Pairs,
     panel: Panel,
     /// Nodes whose moves are summed.
     nodes: Range<usize>,
@@ -68,20 +70,22 @@ pub struct Part {
     pub states: DMatrix<f64>,
     /// Others with the state.
     pub crossed: DMatrix<f64>,
-    /// Others with the first of them: the lower triangle alone.
-    pub own: DMatrix<f64>,
+    /// Others with the first of them.
+    pub own: Pairs,
     /// Rows.
     pub rows: usize,
 }
 
 impl Sums {
     /// Of rows at `nodes` nodes that touch `unknowns`, rising, beside the state; of these the ones in `asked` are
-    /// summed, with each other as far as one of both is in `free`, behind which the other ones stand.
+    /// summed, with each other as far as one of both is in `free`, behind which the other ones stand, and of `waves`
+    /// those that meet.
     pub fn new(
         nodes: usize,
         unknowns: impl Iterator<Item = usize>,
         asked: &Range<usize>,
         free: &Range<usize>,
+        waves: &Knotted,
     ) -> Self {
         let others: Vec<usize> = unknowns.filter(|i| asked.contains(i)).collect();
         let mut places = vec![NOWHERE; asked.len()];
@@ -91,9 +95,9 @@ impl Sums {
         let size = others.len() + 1;
         let columns = others.partition_point(|unknown| *unknown < free.end) + 1;
         Self {
-            near: DMatrix::zeros(BOTH, MOVES * nodes),
-            cross: DMatrix::zeros(size, MOVES * nodes),
-            own: DMatrix::zeros(size, columns),
+            near: blank(BOTH, MOVES * nodes),
+            cross: blank(size, MOVES * nodes),
+            own: Pairs::new(size, columns, &waves.within(&others)),
             panel: Panel::default(),
             nodes: nodes..0,
             touched: Vec::new(),
@@ -138,7 +142,7 @@ impl Sums {
         let mut panel = std::mem::take(&mut self.panel);
         self.nodes = self.nodes.start.min(panel.node)..self.nodes.end.max(panel.node + 2);
         let (first, places) = (MOVES * panel.node, std::mem::take(&mut panel.places));
-        let columns = places.partition_point(|place| *place < self.own.ncols());
+        let columns = places.partition_point(|place| *place < self.own.len());
         for (i, line) in panel.multiply(BOTH + columns).enumerate() {
             let (moves, others) = line.split_at(BOTH);
             if i < BOTH {
@@ -164,7 +168,7 @@ impl Sums {
 
     /// Adds the products of the `i`-th other with those after it.
     fn add_other(&mut self, i: usize, places: &[usize], products: &[f64]) {
-        scatter(&mut self.own, places[i], &places[i..], &products[i..]);
+        self.own.add(places[i], &places[i..], &products[i..]);
     }
 
     /// The sums by unknowns: `state` are those of the state, each with a column of `moves` that says what
@@ -232,7 +236,7 @@ mod tests {
     fn sums_by_way_of_nodes_are_those_of_whole_rows() {
         let free = 1..20;
         let moves = DMatrix::from_fn(MOVES * 4, STATE.len(), |i, j| number(31 * i + 7 * j));
-        let mut sums = Sums::new(4, 8..20, &free, &free);
+        let mut sums = Sums::new(4, 8..20, &free, &free, &Knotted::NONE);
         let mut expected = DMatrix::<f64>::zeros(20, 20);
         let mut right = [0.0; 20];
         for k in 0..200 {

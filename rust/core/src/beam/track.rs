@@ -13,7 +13,7 @@ use super::family::{self, Loading};
 use super::layout::RANGES;
 use super::normal::Normal;
 use super::posed::{Posed, knots};
-use super::sections::Rests;
+use super::sections::{Place, Rests};
 use super::weights::Tally;
 use crate::error::BeamError;
 
@@ -249,7 +249,22 @@ impl Adjustment {
         (0..rows.ncols() / 4).map(of).collect()
     }
 
-    /// States of sections of one hold at an instant and their slopes by all unknowns.
+    /// States of sections of one hold at an instant.
+    pub(super) fn values_at(
+        &self,
+        rests: &Rests,
+        posed: &Posed,
+        hold: usize,
+        time_ns: i64,
+    ) -> Vec<[f64; 4]> {
+        let sections = rests.s_m.iter().zip(&rests.places);
+        let state = |(s_m, rest): (&f64, &Place)| {
+            self.state_of(&self.place_at(posed, hold, *s_m, Some(time_ns)), rest)
+        };
+        sections.map(state).collect()
+    }
+
+    /// The same and their slopes by all unknowns.
     pub(super) fn states_at(
         &self,
         rests: &Rests,

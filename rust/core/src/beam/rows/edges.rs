@@ -1,51 +1,107 @@
 //! Ends of scan lines as rows: the silhouette in the plane of a line lies between its last hit and its first miss.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
-use super::{FLAT_COSINE, Rows};
-use crate::beam::adjust::{EDGE_OFFSET_RAD, EDGE_RAD, Gates, Stage};
+use super::{FLAT_COSINE, Rows, arc_m, some_edges};
+use crate::beam::adjust::{Adjustment, EDGE_OFFSET_RAD, EDGE_RAD, Gates, Stage};
 use crate::beam::echoes::Edge;
+use crate::beam::posed::Posed;
+use crate::beam::rig::Lidar;
 use crate::beam::silhouette::{ScanPlane, Silhouette};
+use crate::beam::sums::Part;
 use crate::beam::weights::{EdgeMet, faded, robust};
 
 /// Edges beside facets seen at a grazing angle over so much are soft, metres across: they count less, and from
 /// the second one on not at all.
 const SOFT_M: (f64, f64) = (0.008, 0.016);
 
-impl Rows<'_> {
-    /// Adds the end of a scan line: the silhouette lies between its last hit and its first miss.
-    pub(in crate::beam) fn add_edge(&mut self, edge: &Edge) {
+/// What silhouettes of a hold are found by, whatever becomes of its rows meanwhile.
+struct Finder<'a> {
+    adjustment: &'a Adjustment,
+    lidars: &'a [Lidar],
+    posed: Arc<Posed>,
+    shifts_ns: Vec<i64>,
+}
+
+/// The end of a scan line, and the silhouette in its plane where there is one.
+struct End<'a> {
+    edge: &'a Edge,
+    time_ns: i64,
+    step_rad: f64,
+    plane: ScanPlane,
+    silhouette: Option<Silhouette>,
+}
+
+impl<'a> Finder<'a> {
+    /// Each is looked for where the last one was.
+    fn all(&self, edges: impl Iterator<Item = &'a Edge>) -> Vec<End<'a>> {
+        let mut last_m = None;
+        let find = |edge| {
+            let end = self.end(edge, last_m);
+            if let Some(silhouette) = &end.silhouette {
+                last_m = Some(arc_m(&self.adjustment.problem.mesh, &silhouette.contact));
+            }
+            end
+        };
+        edges.map(find).collect()
+    }
+
+    fn end(&self, edge: &'a Edge, last_m: Option<f64>) -> End<'a> {
         let lidar = &self.lidars[edge.lidar];
         let hit = lidar.direction(&edge.hit);
         let miss = lidar.direction(&edge.miss);
-        let step_rad = hit.cross(&miss).norm().asin();
         let plane = ScanPlane {
             origin: lidar.origin,
             ahead: hit,
             aside: (miss - hit * hit.dot(&miss)).normalize(),
         };
         let mesh = &self.adjustment.problem.mesh;
-        let time_ns = self.time_ns(edge.lidar, edge.time_ns);
+        let time_ns = edge.time_ns + self.shifts_ns[edge.lidar];
         let blade = self.posed.at(time_ns);
         let near = |s_m: f64| blade.silhouette(mesh, &plane, s_m);
-        let known = self.last_edge_m.and_then(near);
-        let Some(silhouette) = known.or_else(|| near(blade.nearest_s_m(mesh, &plane.origin, &hit)))
-        else {
-            self.tally.edges_left_out[1] += 1;
-            return;
+        let known = last_m.and_then(near);
+        End {
+            silhouette: known.or_else(|| near(blade.nearest_s_m(mesh, &plane.origin, &hit))),
+            step_rad: hit.cross(&miss).norm().asin(),
+            edge,
+            time_ns,
+            plane,
+        }
+    }
+}
+
+impl<'a> Rows<'a> {
+    /// Takes echoes, and behind them at most so many edges, evenly: the silhouettes are looked for meanwhile.
+    pub(in crate::beam) fn take(&mut self, echoes: impl FnOnce(&mut Self) + Send, most: usize) {
+        let finder = Finder {
+            adjustment: self.adjustment,
+            lidars: self.lidars,
+            posed: Arc::clone(&self.posed),
+            shifts_ns: self.shifts_ns.clone(),
         };
-        self.last_edge_m = Some(self.arc_m(&silhouette.contact));
-        self.add_silhouette(edge, time_ns, &plane, &silhouette, step_rad);
+        let edges = &finder.adjustment.problem.holds[self.hold].seen.edges;
+        let ((), ends) = rayon::join(|| echoes(self), || finder.all(some_edges(edges, most)));
+        ends.iter().for_each(|end| self.add_end(end));
     }
 
-    fn add_silhouette(
-        &mut self,
-        edge: &Edge,
-        time_ns: i64,
-        plane: &ScanPlane,
-        silhouette: &Silhouette,
-        step_rad: f64,
-    ) {
+    /// The rows of the edges alone.
+    pub(in crate::beam) fn of_edges(mut self) -> Part {
+        self.take(|_| (), usize::MAX);
+        self.finish().0
+    }
+
+    /// Adds the end of a scan line: the silhouette lies between its last hit and its first miss.
+    fn add_end(&mut self, end: &End<'_>) {
+        match &end.silhouette {
+            Some(silhouette) => self.add_silhouette(end, silhouette),
+            None => self.tally.edges_left_out[1] += 1,
+        }
+    }
+
+    fn add_silhouette(&mut self, end: &End<'_>, silhouette: &Silhouette) {
+        let (edge, step_rad) = (end.edge, end.step_rad);
         let firm = firmness(silhouette, self.gates);
         if firm == 0.0 {
             self.edge_bill.add_faded();
@@ -91,8 +147,8 @@ impl Rows<'_> {
         });
         let weight = robust(residual, sigma, gate_rad) / variance;
         let edge_at = self.places.edge;
-        let along = across(plane, silhouette);
-        let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, time_ns);
+        let along = across(&end.plane, silhouette);
+        let moves = self.fill_row(&silhouette.contact, &along, edge.lidar, end.time_ns);
         self.fill_surface(&silhouette.contact, &along);
         self.entries
             .extend([(edge_at, EDGE_RAD), (at, EDGE_OFFSET_RAD)]);
