@@ -396,8 +396,8 @@ def test_a_longer_bag_takes_no_more_memory(tmp_path: Path) -> None:
         ]
         bag = writer.write(tmp_path / f"{seconds}", scans(writer, sent))
         peaks.append(peak_kb(bag, tmp_path / f"{seconds}.ply"))
-    # 30 s more are 28 MB of packets, a seventh of the whole, and 370 MB of points.
-    assert peaks[1] < 1.1 * peaks[0]
+    # 30 s more are 28 MB of packets and 370 MB of points; a tenth of these may be on their way.
+    assert peaks[1] < peaks[0] + 37_000
 
 
 def test_layouts_of_bags_that_bring_none_are_known(tmp_path: Path) -> None:

@@ -1,3 +1,4 @@
+import contextlib
 import json
 import math
 import os
@@ -222,6 +223,26 @@ def test_progress_ends_with_all_bytes(two: Path) -> None:
     for _ in opened.sweeps(progress=lambda done, total: seen.append((done, total))):
         pass
     assert seen[-1][0] == two.stat().st_size
+
+
+def test_who_goes_on_after_an_error_in_progress_misses_no_sweep(two: Path) -> None:
+    calls = 0
+
+    def refuse_often(*_bytes: int) -> None:
+        nonlocal calls
+        calls += 1
+        if calls % 2:
+            raise RuntimeError("no")
+
+    opened = capture.open(two)
+    expected = [(sweep.lidar, sweep.index, len(sweep)) for sweep in opened.sweeps()]
+    sweeps, found = opened.sweeps(progress=refuse_often), []
+    while len(found) < len(expected):
+        with contextlib.suppress(RuntimeError):
+            found += [(sweep.lidar, sweep.index, len(sweep)) for sweep in (next(sweeps),)]
+    assert found == expected
+    assert calls > 4
+    assert next(sweeps, None) is None
 
 
 def test_an_error_in_progress_stops_the_scan(two: Path) -> None:

@@ -214,6 +214,9 @@ impl<K: Gathered> SweepCutter<K> {
     /// Counts missing packets before the cut to the open sweep; gives those of the turn that the
     /// packet begins in. Turns of which nothing arrived keep theirs.
     fn add_lost(&mut self, packet: &Placed, start_rad: f64) -> u32 {
+        if packet.lost == 0 {
+            return 0;
+        }
         let (Some(open), Some(end)) = (&mut self.open, self.turns.end()) else {
             return 0;
         };
