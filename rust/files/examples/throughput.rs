@@ -24,9 +24,10 @@ const HEAD: u64 = 1500;
 /// Bytes of a batch, as the extension reads them.
 const BATCH_BYTES: usize = 1 << 19;
 
-type Outcome = Result<(u64, u64), Box<dyn std::error::Error>>;
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+type Outcome = Result<(u64, u64), Failure>;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Failure> {
     let mut given = std::env::args().skip(1);
     let (job, path) = given.next().zip(given.next()).ok_or("JOB and CAPTURE")?;
     let paths = [PathBuf::from(path)];
@@ -37,7 +38,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "scan" => (scan(&paths, u64::MAX)?.datagrams, 0),
         "sweeps" => sweeps(&paths, u64::MAX)?,
         "stream" => sweeps(&paths, HEAD)?,
-        "two" => abreast(&paths, 2)?,
+        "two" => ThreadPoolBuilder::new()
+            .num_threads(2)
+            .build()?
+            .install(|| abreast(&paths))?,
         _ => return Err("JOB is bytes, datagrams, scan, sweeps, stream or two".into()),
     };
     println!("{} {count} {points}", begun.elapsed().as_secs_f64());
@@ -70,7 +74,7 @@ fn datagrams(paths: &[PathBuf]) -> Outcome {
 }
 
 /// The first so many datagrams at most.
-fn scan(paths: &[PathBuf], most: u64) -> Result<ScanReport, Box<dyn std::error::Error>> {
+fn scan(paths: &[PathBuf], most: u64) -> Result<ScanReport, Failure> {
     let (mut set, mut scan) = (CaptureSet::open(paths)?, Scan::new(ScanOptions::default()));
     let mut count = 0;
     while count < most
@@ -98,19 +102,18 @@ fn sweeps(paths: &[PathBuf], head: u64) -> Outcome {
 }
 
 /// As `stream`, turns decoded side by side while the next half megabyte is read.
-fn abreast(paths: &[PathBuf], threads: usize) -> Outcome {
+fn abreast(paths: &[PathBuf]) -> Outcome {
     let report = scan(paths, HEAD)?;
     let reader = Abreast::<PointCloud<Sensor>>::new(&report, &SweepOptions::default())?;
     let mut reader = reader.ok_or("turns of this sensor cannot be decoded apart")?;
-    let pool = ThreadPoolBuilder::new().num_threads(threads).build()?;
     let (mut set, mut count, mut points) = (CaptureSet::open(paths)?, 0, 0);
     let [mut batch, mut ahead] = [DatagramBatch::default(), DatagramBatch::default()];
     loop {
         let fill = || fill(&mut set, &mut ahead);
-        let (read, ()) = pool.install(|| rayon::join(fill, || reader.push(&batch)));
+        let (read, ()) = rayon::join(fill, || reader.push(&batch));
         count += read?;
         if ahead.is_empty() {
-            pool.install(|| reader.finish());
+            reader.finish();
         }
         while let Some(sweep) = reader.pop() {
             points += sweep.cloud.len() as u64;
