@@ -51,6 +51,8 @@ pub struct Row {
     pub time_ns: i64,
     /// Block of the packet, the first of two returns.
     pub block: usize,
+    /// Bank of lasers that the row is of.
+    pub bank: usize,
 }
 
 /// The shots of some rows of a packet, placed as if all of them had hit: block by block, without gaps. Meant to be
@@ -67,6 +69,8 @@ pub struct Placed {
     pub intensity: Column<u16>,
     /// Number of each block.
     pub block: [u16; ROOM],
+    /// Bank of lasers that each block is of.
+    pub bank: [usize; ROOM],
     /// When the row of each block begins, nanoseconds since 1970 UTC.
     pub start_ns: [i64; ROOM],
     /// Encoder azimuths, [0, 2 pi).
@@ -122,22 +126,11 @@ impl Lanes {
                 small_turn(turned_rad + self.azimuth_offset_rad[k]);
         }
     }
-
-    /// Places the shots of some rows of a packet.
-    pub fn place(&self, packet: &Packet<'_>, rows: &[Row], returns: usize, placed: &mut Placed) {
-        vectorized(Place {
-            lanes: self,
-            packet,
-            rows,
-            returns,
-            placed,
-        });
-    }
 }
 
 /// Places all shots of some rows.
 struct Place<'a> {
-    lanes: &'a Lanes,
+    banks: &'a [Lanes],
     packet: &'a Packet<'a>,
     rows: &'a [Row],
     returns: usize,
@@ -152,14 +145,16 @@ impl Kernel for Place<'_> {
         let placed = self.placed;
         placed.blocks = 0;
         for row in self.rows {
+            let lanes = &self.banks[row.bank];
             let sin_cos = row.azimuth_rad.sin_cos();
             for block in row.block..row.block + self.returns {
                 let place = placed.blocks % ROOM;
                 placed.block[place] = block as u16;
+                placed.bank[place] = row.bank;
                 placed.start_ns[place] = row.time_ns;
                 placed.read(place, self.packet.returns_of(block));
-                placed.aim(place, self.lanes, row);
-                placed.reach(place, self.lanes, sin_cos);
+                placed.aim(place, lanes, row);
+                placed.reach(place, lanes, sin_cos);
                 placed.blocks += 1;
             }
         }
@@ -167,10 +162,21 @@ impl Kernel for Place<'_> {
 }
 
 impl Placed {
+    /// Places the shots of some rows of a packet; each row names its bank among `banks`.
+    pub fn fill(&mut self, banks: &[Lanes], packet: &Packet<'_>, rows: &[Row], returns: usize) {
+        vectorized(Place {
+            banks,
+            packet,
+            rows,
+            returns,
+            placed: self,
+        });
+    }
+
     /// Instant of a shot, nanoseconds since 1970 UTC.
     #[inline]
-    pub fn time_ns(&self, lanes: &Lanes, block: usize, shot: usize) -> i64 {
-        self.start_ns[block].wrapping_add(lanes.delay_ns[shot].into())
+    pub fn time_ns(&self, banks: &[Lanes], block: usize, shot: usize) -> i64 {
+        self.start_ns[block].wrapping_add(banks[self.bank[block]].delay_ns[shot].into())
     }
 
     /// Takes the echoes of a block.

@@ -2,11 +2,14 @@
 //!
 //! Source: the manuals of VLP-16 (63-9243), HDL-32E (63-9113), VLP-32C (63-9325) and VLS-128 (63-9480).
 
+mod board;
 mod calibration;
 pub mod hdl32e;
 pub mod hdl64e;
 mod lanes;
 mod pairs;
+#[cfg(test)]
+mod plain;
 pub mod position;
 pub mod puck;
 mod reach;
@@ -155,6 +158,12 @@ impl<'a> Packet<'a> {
             any | u64::from_le_bytes(*word) & mask
         });
         ranges != 0
+    }
+
+    /// The same of so many blocks.
+    #[inline(always)]
+    fn any_has_echoes(&self, block: usize, blocks: usize) -> bool {
+        (block..block + blocks).any(|block| self.has_echoes(block))
     }
 
     /// Bytes of the returns of a block, and to each the one that follows it in the packet.

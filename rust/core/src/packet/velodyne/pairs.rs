@@ -30,7 +30,7 @@ impl Pairs {
     ///
     /// Which of the two is the brighter cannot be read from the intensity, which is corrected for
     /// range; so the nearer is called strongest even where the manual makes it the second strongest.
-    pub fn push(&mut self, placed: &Placed, lanes: &Lanes, packet: u32, out: &mut Decoded) {
+    pub fn push(&mut self, placed: &Placed, banks: &[Lanes], packet: u32, out: &mut Decoded) {
         out.merged += self.judge(placed);
         let places = &self.places[..self.count];
         gather(&placed.encoder_rad, places, &mut out.encoder_rad);
@@ -38,10 +38,11 @@ impl Pairs {
         let [x, y, z] = placed.xyz_m.each_ref().map(|axis| axis.as_flattened());
         let shots = || places.iter().map(|place| usize::from(*place) % SHOTS);
         cloud.xyz_m.extend(shots().map(|k| [x[k], y[k], z[k]]));
-        let time_ns = |k: usize| placed.time_ns(lanes, k / CHANNELS, k % CHANNELS);
+        let time_ns = |k: usize| placed.time_ns(banks, k / CHANNELS, k % CHANNELS);
         cloud.time_ns.extend(shots().map(time_ns));
         gather(&placed.azimuth_rad, places, &mut cloud.azimuth_rad);
-        cloud.ring.extend(shots().map(|k| lanes.ring[k % CHANNELS]));
+        let ring = |k: usize| banks[placed.bank[k / CHANNELS]].ring[k % CHANNELS];
+        cloud.ring.extend(shots().map(ring));
         if out.is_slim {
             return;
         }

@@ -3,20 +3,16 @@
 //! In dual return two blocks hold the same shots: the first the last returns, the second the
 //! strongest (or the second strongest where the last is the strongest).
 
-use super::lanes::{Lanes, Placed, Row};
-use super::pairs::Pairs;
+use super::board::Board;
+use super::lanes::{Lanes, Row};
 use super::reach::Reach;
 use super::rotation::Rotation;
-use super::squeeze::Squeezed;
-use super::{BLOCKS, CHANNELS, Packet, RawReturn, TURN_CENTIDEG, position};
+use super::{BLOCKS, CHANNELS, Packet, TURN_CENTIDEG, position};
 use crate::angle::Arc;
-use crate::cloud::{Return, ReturnKind};
+use crate::cloud::ReturnKind;
 use crate::error::InvalidValue;
-use crate::packet::aim::{turn, wrapped};
 use crate::packet::beams::{Beam, Beams};
-use crate::packet::echoes::judge;
 use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode};
-use crate::time::Timestamp;
 
 /// How a model fires.
 #[derive(Debug, Clone, Copy)]
@@ -70,10 +66,7 @@ impl Firing {
         Ok(Box::new(RowsDecoder {
             firing: *self,
             reach: Reach::new(&channels, self.row_ns()),
-            lanes: Lanes::new(&channels, self.range_unit_m),
-            placed: Placed::default(),
-            squeezed: Squeezed::default(),
-            pairs: Pairs::default(),
+            board: Board::new(vec![Lanes::new(&channels, self.range_unit_m)]),
         }))
     }
 
@@ -140,11 +133,8 @@ impl Channel {
 
 struct RowsDecoder {
     firing: Firing,
-    lanes: Lanes,
     reach: Reach,
-    placed: Placed,
-    squeezed: Squeezed,
-    pairs: Pairs,
+    board: Board,
 }
 
 impl Decoder for RowsDecoder {
@@ -155,29 +145,20 @@ impl Decoder for RowsDecoder {
         let rotation = self.firing.rotation(&packet, place.mean_rate_rad_per_ns);
         let mode = packet.return_mode();
         let stride = mode.returns();
-        let (mut rows, mut count) = ([Row::default(); BLOCKS], 0);
+        self.board.open(rotation.rate_rad_per_ns());
         for row in 0..BLOCKS / stride {
             if !is_usable(&packet, row, stride) {
                 out.drops.add("block_invalid", stride as u64);
-            } else if (row * stride..(row + 1) * stride).any(|block| packet.has_echoes(block)) {
-                rows[count] = Row {
+            } else if packet.any_has_echoes(row * stride, stride) {
+                self.board.add(Row {
                     azimuth_rad: rotation.azimuth_rad(row),
                     time_ns: (place.time + rotation.start_ns(row)).0,
                     block: row * stride,
-                };
-                count += 1;
+                    bank: 0,
+                });
             }
         }
-        self.lanes.set_rate(rotation.rate_rad_per_ns());
-        self.lanes
-            .place(&packet, &rows[..count], stride, &mut self.placed);
-        let (placed, lanes) = (&self.placed, &self.lanes);
-        if stride == 1 {
-            let kind = single_kind(mode);
-            self.squeezed.push(placed, lanes, place.packet, kind, out);
-        } else {
-            self.pairs.push(placed, lanes, place.packet, out);
-        }
+        self.board.push(&packet, mode, place.packet, out);
     }
 
     fn may_meet(&self, payload: &[u8], bearings: Arc) -> bool {
@@ -193,118 +174,13 @@ pub fn single_kind(mode: ReturnMode) -> ReturnKind {
     }
 }
 
-/// The shots of one row: where the head points at each of them.
-pub struct Shots {
-    row_azimuth_rad: f64,
-    row_sin_cos: (f64, f64),
-    rate_rad_per_ns: f64,
-    row_time_ns: i64,
-    packet: u32,
-    range_unit_m: f64,
-    // Of the shot that was aimed last.
-    encoder_rad: f64,
-    azimuth_rad: f64,
-    sin_cos: (f64, f64),
-    time_ns: i64,
-}
-
-impl Shots {
-    /// A row at an azimuth and `place.time`.
-    pub fn new(
-        row_azimuth_rad: f64,
-        rate_rad_per_ns: f64,
-        place: Place,
-        range_unit_m: f64,
-    ) -> Self {
-        Self {
-            row_azimuth_rad,
-            row_sin_cos: row_azimuth_rad.sin_cos(),
-            rate_rad_per_ns,
-            row_time_ns: place.time.0,
-            packet: place.packet,
-            range_unit_m,
-            encoder_rad: 0.0,
-            azimuth_rad: 0.0,
-            sin_cos: (0.0, 0.0),
-            time_ns: 0,
-        }
-    }
-
-    /// Points the head to where it is at a channel's shot.
-    #[inline]
-    pub fn aim(&mut self, channel: &Channel) {
-        let turned_rad = self.rate_rad_per_ns * channel.delay_ns as f64;
-        self.encoder_rad = self.row_azimuth_rad + turned_rad;
-        self.azimuth_rad = self.encoder_rad + channel.azimuth_offset_rad;
-        self.sin_cos = turn(self.row_sin_cos, turned_rad + channel.azimuth_offset_rad);
-        self.time_ns = self.row_time_ns.saturating_add(channel.delay_ns);
-    }
-
-    /// Places one echo of the shot that was aimed last.
-    #[inline]
-    pub fn echo(
-        &self,
-        channel: &Channel,
-        echo: RawReturn,
-        return_index: u8,
-        return_kind: ReturnKind,
-        block: usize,
-        out: &mut Decoded,
-    ) {
-        if echo.range == 0 {
-            return;
-        }
-        let range_m = f64::from(echo.range) * self.range_unit_m + channel.range_offset_m;
-        let level_m = range_m * channel.cos_elevation;
-        let (sin, cos) = self.sin_cos;
-        let height_m = range_m * channel.sin_elevation + channel.vertical_offset_m;
-        out.encoder_rad.push(wrapped(self.encoder_rad));
-        out.cloud.push(&Return {
-            xyz_m: [
-                (level_m * cos) as f32,
-                (-level_m * sin) as f32,
-                height_m as f32,
-            ],
-            time: Timestamp(self.time_ns),
-            range_m: range_m as f32,
-            azimuth_rad: wrapped(self.azimuth_rad),
-            ring: channel.ring,
-            intensity: u16::from(echo.intensity),
-            return_index,
-            return_kind,
-            packet: self.packet,
-            block: block as u16,
-        });
-    }
-
-    /// Places the two echoes of one shot, the second of which stands in block `next` behind the first's.
-    ///
-    /// Which of the two is the brighter cannot be read from the intensity, which is corrected for
-    /// range; so the nearer is called strongest even where the manual makes it the second strongest.
-    pub fn pair(
-        &mut self,
-        channel: &Channel,
-        echoes: [RawReturn; 2],
-        block: usize,
-        out: &mut Decoded,
-    ) {
-        self.aim(channel);
-        let (kinds, merged) = judge(ReturnMode::Dual, &echoes);
-        out.merged += u64::from(merged);
-        for (place, (echo, kind)) in echoes.into_iter().zip(kinds).enumerate() {
-            if let Some(kind) = kind {
-                self.echo(channel, echo, place as u8, kind, block + place, out);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::packet::velodyne::plain::{Shots, random_packet};
     use crate::packet::velodyne::puck::{FIRING_NS, RANGE_UNIT_M, VLP16};
-    use crate::packet::velodyne::{BLOCKS, LEN, RawBlock, encode};
-    use rand::{RngExt, SeedableRng};
+    use crate::time::Timestamp;
+    use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
     const FIRING: Firing = Firing {
@@ -323,26 +199,6 @@ mod tests {
         Beams::new(channels).unwrap()
     }
 
-    /// A packet of which about `share` of the shots hit; the second echo often repeats the first.
-    fn packet(rng: &mut ChaCha8Rng, mode: ReturnMode, share: f64) -> [u8; LEN] {
-        let mut blocks = [RawBlock::default(); BLOCKS];
-        for number in 0..BLOCKS {
-            let row = number / mode.returns();
-            blocks[number].azimuth_centideg = (35_900 + 39 * row as u16) % TURN_CENTIDEG;
-            for shot in 0..CHANNELS {
-                let range = rng.random_range(1..=u16::MAX);
-                let range = if rng.random_bool(share) { range } else { 0 };
-                let intensity = rng.random();
-                let repeated = number % mode.returns() == 1 && rng.random_bool(0.3);
-                blocks[number].returns[shot] = match repeated {
-                    true => blocks[number - 1].returns[shot],
-                    false => RawReturn { range, intensity },
-                };
-            }
-        }
-        encode(&blocks, 1_000_000, mode, 0x22)
-    }
-
     /// The same shot by shot.
     fn one_by_one(beams: &Beams, payload: &[u8], place: Place, out: &mut Decoded) {
         let packet = Packet::new(payload).unwrap();
@@ -354,17 +210,11 @@ mod tests {
             let place = Place { time, ..place };
             let mut shots = Shots::new(rotation.azimuth_rad(row), rate, place, RANGE_UNIT_M);
             let block = row * stride;
-            let [first, second] = [block, block + stride - 1].map(|block| packet.echoes(block));
-            for shot in 0..CHANNELS {
+            let second = packet.returns(block + stride - 1);
+            for (shot, echoes) in packet.returns(block).zip(second).enumerate() {
                 let firing_ns = (shot / 16) as i64 * FIRING_NS;
                 let channel = Channel::new(&beams.channels()[shot % 16], firing_ns);
-                if stride == 2 {
-                    shots.pair(&channel, [first[shot], second[shot]], block, out);
-                } else {
-                    let kind = single_kind(packet.return_mode());
-                    shots.aim(&channel);
-                    shots.echo(&channel, first[shot], 0, kind, block, out);
-                }
+                shots.shot(&channel, echoes, packet.return_mode(), block, out);
             }
         }
     }
@@ -381,7 +231,7 @@ mod tests {
         };
         for mode in [ReturnMode::Strongest, ReturnMode::Last, ReturnMode::Dual] {
             for share in [0.0, 0.05, 0.6, 1.0] {
-                let payload = packet(&mut rng, mode, share);
+                let payload = random_packet(&mut rng, mode, share, 1);
                 let (mut found, mut expected) = (Decoded::default(), Decoded::default());
                 decoder.decode(&payload, place, &mut found);
                 one_by_one(&beams, &payload, place, &mut expected);

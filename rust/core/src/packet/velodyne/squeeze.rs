@@ -65,14 +65,14 @@ impl Squeezed {
     pub fn push(
         &mut self,
         placed: &Placed,
-        lanes: &Lanes,
+        banks: &[Lanes],
         packet: u32,
         return_kind: ReturnKind,
         out: &mut Decoded,
     ) {
         moving(Squeeze {
             placed,
-            lanes,
+            banks,
             into: self,
         });
         self.append(packet, return_kind, out);
@@ -104,7 +104,7 @@ impl Squeezed {
 
 struct Squeeze<'a> {
     placed: &'a Placed,
-    lanes: &'a Lanes,
+    banks: &'a [Lanes],
     into: &'a mut Squeezed,
 }
 
@@ -115,6 +115,7 @@ impl MovingKernel for Squeeze<'_> {
     fn run<M: Moves>(self, moves: M) {
         let mut count = 0;
         for block in 0..self.placed.blocks.min(ROOM) {
+            let lanes = &self.banks[self.placed.bank[block]];
             for (octet, hits) in self.placed.hits[block]
                 .to_le_bytes()
                 .into_iter()
@@ -126,7 +127,7 @@ impl MovingKernel for Squeeze<'_> {
                     from: octet * OCTET,
                     to: count % SHOTS,
                 };
-                octet.squeeze(self.placed, block, self.lanes, self.into);
+                octet.squeeze(self.placed, block, lanes, self.into);
                 count += hits.count_ones() as usize;
             }
         }

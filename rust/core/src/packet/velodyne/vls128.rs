@@ -10,7 +10,9 @@
 use std::f64::consts::PI;
 use std::sync::LazyLock;
 
-use super::rows::{self, Channel, Shots, single_kind};
+use super::board::Board;
+use super::lanes::{Lanes, Row};
+use super::rows::{self, Channel};
 use super::{BLOCKS, CHANNELS, Packet, TURN_CENTIDEG, calibration};
 use crate::angle::{wrap_half_turn, wrap_turn};
 use crate::error::{InvalidValue, UnitError};
@@ -79,13 +81,7 @@ impl Vls128 {
 
     fn decoder(beams: &Beams) -> Result<Box<dyn Decoder>, InvalidValue> {
         beams.expect(LASERS)?;
-        Ok(Box::new(Vls128Decoder {
-            beams: beams.clone(),
-            channels: channels(beams, USUAL_SLOT_NS),
-            slot_ns: USUAL_SLOT_NS,
-            last: None,
-            rate_rad_per_ns: 0.0,
-        }))
+        Ok(Box::new(Vls128Decoder::new(beams)))
     }
 }
 
@@ -94,14 +90,18 @@ fn slot(laser: usize) -> i64 {
     (laser / 8 + 2 * (laser / 64)) as i64
 }
 
-fn channels(beams: &Beams, slot_ns: i64) -> Vec<Channel> {
-    let lasers = beams.channels().iter().enumerate();
-    lasers
-        .map(|(laser, beam)| {
-            let delay_ns = slot(laser) * slot_ns;
-            Channel::new(&Beam { delay_ns, ..*beam }, 0)
-        })
-        .collect()
+fn channel(beams: &Beams, laser: usize, slot_ns: i64) -> Channel {
+    let delay_ns = slot(laser) * slot_ns;
+    let beam = beams.channels()[laser];
+    Channel::new(&Beam { delay_ns, ..beam }, 0)
+}
+
+fn banks(beams: &Beams, slot_ns: i64) -> Vec<Lanes> {
+    let of_bank = |bank: usize| {
+        let channels = std::array::from_fn(|k| channel(beams, bank * CHANNELS + k, slot_ns));
+        Lanes::new(&channels, RANGE_UNIT_M)
+    };
+    (0..BANKS).map(of_bank).collect()
 }
 
 /// Sequences of a packet.
@@ -221,13 +221,23 @@ fn usable<'a>(packet: &'a Packet<'a>) -> impl Iterator<Item = (usize, usize)> + 
 
 struct Vls128Decoder {
     beams: Beams,
-    channels: Vec<Channel>,
+    board: Board,
     slot_ns: i64,
     last: Option<(Timestamp, f64)>,
     rate_rad_per_ns: f64,
 }
 
 impl Vls128Decoder {
+    fn new(beams: &Beams) -> Self {
+        Self {
+            beams: beams.clone(),
+            board: Board::new(banks(beams, USUAL_SLOT_NS)),
+            slot_ns: USUAL_SLOT_NS,
+            last: None,
+            rate_rad_per_ns: 0.0,
+        }
+    }
+
     /// Learns slot and rate from the packet before, where that one is the neighbour.
     fn follow(&mut self, packet: &Packet<'_>, time: Timestamp) {
         let Some(azimuth_rad) = azimuth(packet, 0) else {
@@ -247,7 +257,7 @@ impl Vls128Decoder {
             self.rate_rad_per_ns = rate;
             if slot_ns != self.slot_ns {
                 self.slot_ns = slot_ns;
-                self.channels = channels(&self.beams, slot_ns);
+                self.board.set_banks(banks(&self.beams, slot_ns));
             }
         } else if let Some(rate) = rate_within(packet) {
             self.rate_rad_per_ns = rate;
@@ -270,26 +280,77 @@ impl Decoder for Vls128Decoder {
         let expected = sequences(mode) * BANKS;
         out.drops
             .add("block_invalid", (expected - usable(&packet).count()) as u64);
+        self.board.open(self.rate_rad_per_ns);
         for (sequence, block) in usable(&packet) {
-            let after_ns = sequence as i64 * SLOTS * self.slot_ns - LEAD_NS;
-            let place = Place {
-                time: place.time + after_ns,
-                ..place
-            };
-            let azimuth_rad = azimuth(&packet, block).unwrap_or_default();
-            let mut shots = Shots::new(azimuth_rad, self.rate_rad_per_ns, place, RANGE_UNIT_M);
-            let bank = packet.bank(block).unwrap_or_default();
-            let channels = &self.channels[bank * CHANNELS..][..CHANNELS];
-            if mode.returns() == 1 {
-                for (channel, echo) in channels.iter().zip(packet.returns(block)) {
-                    shots.aim(channel);
-                    shots.echo(channel, echo, 0, single_kind(mode), block, out);
-                }
-                continue;
+            if packet.any_has_echoes(block, mode.returns()) {
+                let after_ns = sequence as i64 * SLOTS * self.slot_ns - LEAD_NS;
+                self.board.add(Row {
+                    azimuth_rad: azimuth(&packet, block).unwrap_or_default(),
+                    time_ns: (place.time + after_ns).0,
+                    block,
+                    bank: packet.bank(block).unwrap_or_default(),
+                });
             }
-            let pairs = packet.returns(block).zip(packet.returns(block + 1));
-            for (channel, (last, strongest)) in channels.iter().zip(pairs) {
-                shots.pair(channel, [last, strongest], block, out);
+        }
+        self.board.push(&packet, mode, place.packet, out);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packet::velodyne::plain::{Shots, random_packet};
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    /// Banks of the packets whose flag or azimuth is broken.
+    const BROKEN: u64 = 2;
+
+    /// A packet shot by shot, at the slot and rate that a decoder has learnt.
+    fn one_by_one(known: &Vls128Decoder, payload: &[u8], place: Place, out: &mut Decoded) {
+        let packet = Packet::new(payload).unwrap();
+        let mode = packet.return_mode();
+        for (sequence, block) in usable(&packet) {
+            let after_ns = sequence as i64 * SLOTS * known.slot_ns - LEAD_NS;
+            let time = place.time + after_ns;
+            let place = Place { time, ..place };
+            let azimuth_rad = azimuth(&packet, block).unwrap();
+            let mut shots = Shots::new(azimuth_rad, known.rate_rad_per_ns, place, RANGE_UNIT_M);
+            let second = packet.returns(block + mode.returns() - 1);
+            for (k, echoes) in packet.returns(block).zip(second).enumerate() {
+                let laser = packet.bank(block).unwrap() * CHANNELS + k;
+                let channel = channel(&known.beams, laser, known.slot_ns);
+                shots.shot(&channel, echoes, mode, block, out);
+            }
+        }
+    }
+
+    #[test]
+    fn shots_side_by_side_are_those_one_by_one() {
+        let mut rng = ChaCha8Rng::seed_from_u64(128);
+        for mode in [ReturnMode::Strongest, ReturnMode::Last, ReturnMode::Dual] {
+            let mut decoder = Vls128Decoder::new(&Vls128::beams());
+            let mut time = Timestamp(1_718_000_000_000_000_000);
+            // The slot becomes another from packet to packet, and with it the rate.
+            for (slot_ns, share) in SLOT_NS.into_iter().cycle().zip([0.6, 0.0, 0.05, 0.6, 1.0]) {
+                let mut payload = random_packet(&mut rng, mode, share, 4);
+                // The flag of block 4 and the azimuth of block 6, each of a bank of its own.
+                payload[401] = 0;
+                payload[603] = 0xFF;
+                time = time + sequences(mode) as i64 * SLOTS * slot_ns;
+                let place = Place {
+                    time,
+                    packet: 7,
+                    mean_rate_rad_per_ns: 0.0,
+                };
+                let (mut found, mut expected) = (Decoded::default(), Decoded::default());
+                decoder.decode(&payload, place, &mut found);
+                one_by_one(&decoder, &payload, place, &mut expected);
+                expected.drops.add("block_invalid", BROKEN);
+                assert!(decoder.rate_rad_per_ns >= 0.0);
+                assert_eq!(expected.cloud.is_empty(), share == 0.0);
+                let (found, expected) = (format!("{found:?}"), format!("{expected:?}"));
+                assert_eq!(found, expected, "{mode:?}, {share}");
             }
         }
     }
