@@ -48,13 +48,13 @@ mod field {
     pub const PRODUCT: usize = 1205;
 }
 
-/// First byte of the flags of all blocks; the second tells the bank of lasers.
 /// Which bytes of three words of eight returns belong to ranges.
 const RANGE_BYTES: [u64; 3] = [
     0xFFFF_00FF_FF00_FFFF,
     0xFF00_FFFF_00FF_FF00,
     0x00FF_FF00_FFFF_00FF,
 ];
+/// First byte of the flags of all blocks; the second tells the bank of lasers.
 const FLAG_FIRST: u8 = 0xFF;
 /// Second bytes of the flags of lasers 0 to 31, 32 to 63, 64 to 95 and 96 to 127.
 const FLAG_BANKS: [u8; 4] = [0xEE, 0xDD, 0xCC, 0xBB];
