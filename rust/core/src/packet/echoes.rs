@@ -21,6 +21,11 @@ pub struct RawEcho {
 /// Meaning of each echo of a shot; `None` for no return and for one that repeats another.
 pub type Meanings = [Option<ReturnKind>; MOST];
 
+/// Meaning of the only echo of a setting for single returns.
+pub fn single_kind(mode: ReturnMode) -> ReturnKind {
+    only_kind(mode, 0)
+}
+
 /// Judges the echoes of one shot; gives their meanings and how many were merged into others.
 #[inline]
 pub fn judge(mode: ReturnMode, echoes: &[RawEcho]) -> (Meanings, u32) {

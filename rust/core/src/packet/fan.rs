@@ -11,7 +11,7 @@ use super::aim::{within_half_turn, wrapped};
 use super::echoes::MOST;
 use super::sheet::{LANES, Lane, Sheet, lane, lane_mut};
 use crate::simd::{Kernel, vectorized};
-pub use desk::{Desk, single_kind};
+pub use desk::Desk;
 pub use known::Known;
 
 /// One shot, in the frame of the rotor.

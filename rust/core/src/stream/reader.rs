@@ -200,11 +200,6 @@ impl<K: Kept> Reader<SweepCutter<K>> {
         self.out.pop_front()
     }
 
-    /// Whether [`Reader::pop`] would give a sweep.
-    pub fn has_ready(&self) -> bool {
-        !self.out.is_empty()
-    }
-
     /// Gives the memory of a sweep back for the next ones of its lidar.
     pub fn recycle(&mut self, lidar: usize, kept: K) {
         if let Some(sink) = self.sink_of(lidar) {

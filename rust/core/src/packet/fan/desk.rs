@@ -2,7 +2,7 @@
 
 use super::{Fan, Row, place};
 use crate::cloud::ReturnKind;
-use crate::packet::echoes::{MOST, RawEcho, judge};
+use crate::packet::echoes::{MOST, single_kind};
 use crate::packet::sheet::Sheet;
 use crate::packet::{Decoded, ReturnMode};
 
@@ -140,15 +140,6 @@ impl Desk {
             }
         }
     }
-}
-
-/// Meaning of the only echo of a setting for single returns.
-pub fn single_kind(mode: ReturnMode) -> ReturnKind {
-    let echo = RawEcho {
-        range: 1,
-        intensity: 0,
-    };
-    judge(mode, &[echo]).0[0].unwrap_or(ReturnKind::Strongest)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use super::rotating::ray;
 use super::unit::OBTAIN;
 use crate::error::UnitError;
 use crate::packet::aim::{within_half_turn, wrapped};
-use crate::packet::fan::single_kind;
+use crate::packet::echoes::single_kind;
 use crate::packet::rays::Rays;
 use crate::packet::sheet::Sheet;
 use crate::packet::unit::{Calibration, Fitted, UnitFile};

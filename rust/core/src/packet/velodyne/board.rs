@@ -2,9 +2,9 @@
 
 use super::lanes::{Lanes, Placed, Row};
 use super::pairs::Pairs;
-use super::rows::single_kind;
 use super::squeeze::Squeezed;
 use super::{BLOCKS, Packet};
+use crate::packet::echoes::single_kind;
 use crate::packet::{Decoded, ReturnMode};
 
 /// The rows of one packet at a time. Meant to be used again and again.

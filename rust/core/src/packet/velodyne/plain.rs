@@ -1,10 +1,10 @@
 //! The plain twin of decoding, for tests: shot by shot and echo by echo.
 
-use super::rows::{Channel, single_kind};
+use super::rows::Channel;
 use super::{BLOCKS, CHANNELS, LEN, RawBlock, RawReturn, TURN_CENTIDEG, encode};
 use crate::cloud::{Return, ReturnKind};
 use crate::packet::aim::{turn, wrapped};
-use crate::packet::echoes::judge;
+use crate::packet::echoes::{judge, single_kind};
 use crate::packet::{Decoded, Place, ReturnMode};
 use crate::time::Timestamp;
 use rand::RngExt;

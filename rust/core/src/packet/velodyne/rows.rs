@@ -9,7 +9,6 @@ use super::reach::Reach;
 use super::rotation::Rotation;
 use super::{BLOCKS, CHANNELS, Packet, TURN_CENTIDEG, position};
 use crate::angle::Arc;
-use crate::cloud::ReturnKind;
 use crate::error::InvalidValue;
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::{Decoded, Decoder, Head, PacketKind, Place, ReturnMode};
@@ -163,14 +162,6 @@ impl Decoder for RowsDecoder {
 
     fn may_meet(&self, payload: &[u8], bearings: Arc) -> bool {
         Packet::new(payload).is_none_or(|packet| self.reach.meets(&packet, bearings))
-    }
-}
-
-/// Meaning of the echoes of a single-return setting.
-pub fn single_kind(mode: ReturnMode) -> ReturnKind {
-    match mode {
-        ReturnMode::Last => ReturnKind::Last,
-        _ => ReturnKind::Strongest,
     }
 }
 
