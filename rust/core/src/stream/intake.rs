@@ -3,13 +3,13 @@
 use super::arrivals::{Arrival, Arrivals, Ordered, mark};
 use super::reader::SweepOptions;
 use super::report::{Pause, ScanReport, StreamInfo};
-use super::{ScanOptions, StreamKey, packets};
+use super::{ScanOptions, StreamKey, is_data, packets};
 use crate::capture::Datagram;
 use crate::clock::ClockModel;
 use crate::error::InvalidValue;
 use crate::loss::view::FieldOfView;
 use crate::packet::split::Following;
-use crate::packet::{Decoded, Decoder, ModelRef, PacketKind, Place};
+use crate::packet::{Decoded, Decoder, ModelRef, Place};
 use crate::sweep::Placed;
 use crate::time::Timestamp;
 
@@ -111,7 +111,7 @@ impl Intakes {
         };
         let intake = &mut self.intakes[place];
         for packet in packets(datagram) {
-            if !intake.is_done && intake.is_data(packet.payload) {
+            if !intake.is_done && is_data(intake.model, intake.is_named, packet.payload) {
                 intake.push(&packet, &self.course, &mut |ready| give(place, ready));
             }
         }
@@ -141,14 +141,6 @@ impl Intake {
             spare: Vec::new(),
             held: None,
             is_done: false,
-        }
-    }
-
-    fn is_data(&self, payload: &[u8]) -> bool {
-        if self.is_named {
-            self.model.fits(payload)
-        } else {
-            self.model.recognise(payload) == Some(PacketKind::Data)
         }
     }
 

@@ -2,10 +2,10 @@
 
 use std::f64::consts::PI;
 
-use super::StreamKey;
 use super::arrivals::{Arrival, Arrivals, Gap, Ordered, Ticket, mark};
 use super::probe::Choice;
 use super::report::{Pause, PositionFacts, Second, StreamInfo};
+use super::{StreamKey, is_data};
 use crate::angle::wrap_turn;
 use crate::clock::ClockEstimator;
 use crate::drops::Drops;
@@ -13,7 +13,7 @@ use crate::loss::Counts;
 use crate::loss::view::FieldOfView;
 use crate::packet::split::Split;
 use crate::packet::unit::{Calibration, Gather, UnitFile};
-use crate::packet::{ModelRef, PacketKind, Tally};
+use crate::packet::{ModelRef, Tally};
 use crate::time::{NANOS_PER_SECOND, TimePair, Timestamp};
 
 /// Gaps wait for the field of view to be known, but not more of them than this.
@@ -102,11 +102,7 @@ impl Lidar {
     }
 
     pub fn is_data(&self, payload: &[u8]) -> bool {
-        if self.is_named {
-            self.model.fits(payload)
-        } else {
-            self.model.recognise(payload) == Some(PacketKind::Data)
-        }
+        is_data(self.model, self.is_named, payload)
     }
 
     /// What the data packets tell of the unit.

@@ -27,7 +27,7 @@ use std::net::{IpAddr, SocketAddr};
 use crate::capture::Datagram;
 use crate::error::InvalidValue;
 use crate::packet::unit::UnitFile;
-use crate::packet::{ModelRef, pieces, unit_models};
+use crate::packet::{ModelRef, PacketKind, pieces, unit_models};
 
 pub use abreast::Abreast;
 pub use beside::{Beside, Reading, Taker, Taking};
@@ -161,6 +161,15 @@ impl ScanOptions {
     pub fn named_model(&self, key: &StreamKey) -> Option<ModelRef> {
         let named = self.models.iter().find(|(source, _)| source.matches(key));
         named.map(|(_, model)| *model)
+    }
+}
+
+/// Whether a payload is a data packet of a stream's model: told by its size alone where the user named the model.
+fn is_data(model: ModelRef, is_named: bool, payload: &[u8]) -> bool {
+    if is_named {
+        model.fits(payload)
+    } else {
+        model.recognise(payload) == Some(PacketKind::Data)
     }
 }
 

@@ -2,11 +2,10 @@
 
 use super::{BLOCKS, Packet, TURN_CENTIDEG};
 use crate::packet::LeftOut;
+use crate::packet::aim::RAD_PER_CENTIDEG;
 
 /// One turn, 0.01 degree.
 pub const TURN: i32 = TURN_CENTIDEG as i32;
-/// Angle of one hundredth of a degree.
-const RAD_PER_CENTIDEG: f64 = std::f64::consts::PI / 18_000.0;
 /// More rows than any packet of the family has.
 pub const MAX_ROWS: usize = BLOCKS;
 /// Steps back by less than this are jitter of the encoder, not a gap of nearly a turn; 0.01 degree.

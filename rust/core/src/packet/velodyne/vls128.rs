@@ -16,6 +16,7 @@ use super::rows::{self, Channel};
 use super::{BLOCKS, CHANNELS, Packet, TURN_CENTIDEG, calibration};
 use crate::angle::{wrap_half_turn, wrap_turn};
 use crate::error::{InvalidValue, UnitError};
+use crate::packet::aim::RAD_PER_CENTIDEG;
 use crate::packet::beams::{Beam, Beams};
 use crate::packet::unit::{Fitted, UnitFile};
 use crate::packet::{Decoded, Decoder, Head, Misfit, Model, PacketKind, Place, ReturnMode, Tally};
@@ -40,7 +41,6 @@ pub const LEAD_NS: i64 = 7_000;
 const FOCAL_DISTANCE_M: f64 = 0.058_63;
 /// No rotor turns faster; 30 turns a second.
 const MOST_RAD_PER_NS: f64 = 30.0 * 2.0 * PI * 1e-9;
-const RAD_PER_CENTIDEG: f64 = PI / 18_000.0;
 
 /// Elevation and rotation of each laser, degrees.
 static TABLE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| {
